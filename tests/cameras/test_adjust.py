@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import HAND, aligned_error, by_hand, dependent, room, walk
+from helpers import aligned_error, by_hand, room, walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -13,7 +13,6 @@ from vidsindy_lite.cameras import Lags, learn_cameras, systematic_errors
 from vidsindy_lite.cameras.adjust import (
     PARTS,
     SIZE,
-    NearCamera,
     adjust,
     changed,
     fitted_factor,
@@ -135,20 +134,6 @@ def test_a_change_and_back(seed):
     assert changed(camera, np.zeros(SIZE)) is camera
 
 
-def test_what_is_known_of_a_camera():
-    rng = np.random.default_rng(0)
-    camera = replace(room(rng).cameras[0], **HAND, principal_point_error=3.0, distortion_error=0.1)
-    errors = known_to(camera)
-    np.testing.assert_allclose(errors[PARTS["normal"]], np.deg2rad(2))
-    np.testing.assert_allclose(errors[PARTS["angle"]], np.deg2rad(2))
-    np.testing.assert_allclose(errors[PARTS["scale"]], 0.03)
-    np.testing.assert_allclose(errors[PARTS["position"]], 0.03)
-    np.testing.assert_allclose(errors[PARTS["distortion"]], [0.1, 0.1, 0.01, 0.01])
-    assert np.isinf(known_to(replace(camera, scale=None, angle=None))[2:4]).all()
-    flat = vl.OrthographicCamera(normal=(0, 0, 1), scale=1.0, angle=0.0)
-    assert known_to(flat)[PARTS["position"]].tolist() == [np.inf, np.inf, 0.0]
-
-
 def test_orthographic_normals_measured_by_hand():
     x = 10 * walk(np.arange(400))
     rng = np.random.default_rng(8)
@@ -227,18 +212,6 @@ def test_the_noise_is_that_of_the_tracks_however_many_views_there_are(views):
     assert np.mean(told) == pytest.approx(0.4, rel=0.04)
 
 
-@pytest.mark.parametrize("tilt", [(0.02, 0), (0, 0.02), (-0.1, 0.3)])
-def test_a_tilt_leads_the_normal_along_the_axes_of_the_image(tilt):
-    camera = room(np.random.default_rng(10)).cameras[0]
-    change = np.zeros(SIZE)
-    change[PARTS["normal"]] = tilt
-    normal = changed(camera, change).normal
-    along, across = camera.normal @ normal, camera.rows @ normal
-    np.testing.assert_allclose(across / along, tilt, atol=1e-12)
-    assert along > 0
-    np.testing.assert_allclose(np.linalg.norm(normal), 1)
-
-
 def test_the_unit_of_length_does_not_matter():
     rng = np.random.default_rng(13)
     rig = room(rng)
@@ -260,52 +233,6 @@ def test_the_unit_of_length_does_not_matter():
 CAMERA = room(np.random.default_rng(3), principal_point=(630.0, 350.0), readout=0.3).cameras[0]
 
 
-def after(camera=CAMERA, **parts):
-    change = np.zeros(SIZE)
-    for name, values in parts.items():
-        change[PARTS[name.replace("_", " ")]] = values
-    return changed(camera, change)
-
-
-def test_a_position_moves_along_the_axes_of_the_image():
-    moved = after(position=(0.1, -0.2, 0.3)).position - CAMERA.position
-    along, across = CAMERA.normal @ moved, CAMERA.rows @ moved
-    np.testing.assert_allclose([*across, along], (0.1, -0.2, 0.3), atol=1e-12)
-
-
-def test_numbers_of_the_image_are_added():
-    assert after(principal_point=(5.0, -7.0)).principal_point.tolist() == [635, 343]
-    bent = after(distortion=(0.1, -0.02, 0.001, 0.002))
-    assert bent.distortion.tolist() == [0.1, -0.02, 0.001, 0.002, 0]
-    twice = after(bent, distortion=(0.1, 0, 0, 0))
-    np.testing.assert_allclose(twice.distortion, [0.2, -0.02, 0.001, 0.002, 0])
-
-
-@pytest.mark.parametrize(("by", "readout"), [(0.2, 0.5), (-0.4, -0.1), (0.9, 1.0), (-2, -1.0)])
-def test_a_shutter_rolls_over_one_frame_at_most(by, readout):
-    assert after(readout=by).readout == pytest.approx(readout)
-
-
-def test_a_scale_grows_by_a_factor_and_an_angle_by_a_sum():
-    turned = after(scale=0.1, angle=0.2)
-    assert turned.scale == pytest.approx(CAMERA.scale * np.exp(0.1))
-    assert np.exp(1j * turned.angle) == pytest.approx(np.exp(1j * (CAMERA.angle + 0.2)))
-
-
-def test_a_nearer_camera_sees_what_is_close_larger():
-    about = np.array([1.0, 2.0, 3.0])
-    near = NearCamera(
-        position=about, normal=(0.6, 0, 0.8), scale=1.0, angle=0.0, about=about, nearness=0.01
-    )
-    nearer = after(near, nearness=0.04)
-    assert nearer.nearness == pytest.approx(0.05)
-    right = near.rows[0]
-    at = [about, about + right, about + right + 4 * near.normal]  # the last one 4 nearer, of 20
-    middle, beside, close = nearer.image(np.array(at))
-    assert np.linalg.norm(beside - middle) > 0.1
-    np.testing.assert_allclose(close - middle, (beside - middle) / 0.8, atol=1e-9)
-
-
 def test_how_well_a_camera_is_known():
     """A tangential distortion is ten times as small as a radial one."""
     image = {"principal_point_error": 4.0, "distortion_error": 0.3, "readout_error": 0.2}
@@ -320,44 +247,6 @@ def test_how_well_a_camera_is_known():
     assert np.isinf(unknown[2:4]).all()
     flat = known_to(vl.OrthographicCamera(normal=(0, 0, 1), scale=1, angle=0))
     assert np.flatnonzero(np.isinf(flat)).tolist() == [4, 5]  # along its axis it sees the same
-
-
-def test_long_run_covariance_by_the_book():
-    """Newey and West 1987 with the width of Andrews 1991, written out."""
-    series = dependent(np.random.default_rng(2), 60, 0.5)
-    n = len(series)
-    parts = []
-    for column in series.T:
-        rho = sum(column[t] * column[t - 1] for t in range(1, n)) / sum(column**2)
-        parts.append(4 * rho**2 / ((1 - rho) ** 2 * (1 + rho) ** 2))
-    width = 1.1447 * (np.mean(parts) * n) ** (1 / 3)
-    assert 2 < width < 20
-    total = np.zeros((2, 2))
-    for s in range(n):
-        for t in range(n):
-            total += max(0, 1 - abs(s - t) / (width + 1)) * np.outer(series[s], series[t])
-    found = long_run_covariance(series)
-    # The last weight that counts is the first one that is zero or less.
-    lag = int(np.ceil(width))
-    product = series[lag:].T @ series[:-lag]
-    total += min(0, 1 - lag / (width + 1)) * (product + product.T)
-    np.testing.assert_allclose(found, total / n, rtol=1e-10)
-
-
-def test_covariance_of_independent_residuals_is_that_of_least_squares():
-    rng = np.random.default_rng(3)
-    slope = rng.normal(size=(4000, 3, 2))
-    missed = 0.2 * rng.normal(size=(4000, 3))
-    factor = fitted_factor(missed, slope, np.zeros(2), 0.2)
-    flat = slope.reshape(-1, 2)
-    expected = 0.2**2 * np.linalg.inv(flat.T @ flat)
-    size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
-    assert np.abs(factor @ factor.T - expected).max() < 0.15 * size.max()
-    # Every residual three times in a row: three times the variance for as many numbers.
-    thrice = np.repeat(missed, 3, 0), np.repeat(slope, 3, 0)
-    tripled = fitted_factor(*thrice, np.zeros(2), 0.2)
-    grown = np.trace(tripled @ tripled.T) / np.trace(factor @ factor.T)
-    assert 0.6 < grown < 1.1  # and a third if they were taken as independent
 
 
 def test_measurements_and_residuals_add_up():

@@ -3,13 +3,11 @@
 import re
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 from helpers import trajectory
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
 from vidsindy_lite.cameras import (
     OrthographicCamera,
@@ -79,23 +77,6 @@ class TestProjection:
 
     @given(SEEDS)
     @settings(max_examples=20)
-    def test_agrees_with_opencv(self, seed):
-        x, rig, tracks, _ = scene(seed, n=20)
-        for camera, pixels in zip(rig.cameras, tracks, strict=True):
-            # OpenCV's camera looks along +z, with y down; T^-1 turns the image.
-            axis = np.cross(camera.normal, [0, 0, 1])
-            tilt = np.arctan2(np.linalg.norm(axis), camera.normal[2])
-            flat = Rotation.from_rotvec(tilt * axis / np.linalg.norm(axis))
-            turn = Rotation.from_rotvec([0, 0, camera.angle])
-            rotation = (Rotation.from_euler("x", np.pi) * turn * flat).as_matrix()
-            f = 1 / camera.scale
-            inner = np.array([[f, 0, 255.5], [0, f, 255.5], [0, 0, 1]])
-            shift = -rotation @ camera.position
-            expected, _ = cv2.projectPoints(x, cv2.Rodrigues(rotation)[0], shift, inner, None)
-            np.testing.assert_allclose(pixels, expected[:, 0], atol=1e-8)
-
-    @given(SEEDS)
-    @settings(max_examples=20)
     def test_far_away_it_is_orthographic(self, seed):
         x, rig, _, _ = scene(seed, n=20)
         middle = x.mean(axis=0)
@@ -112,8 +93,9 @@ class TestProjection:
     def test_uncalibrated(self):
         camera = PerspectiveCamera(position=(0, 0, 1), normal=(0, 0, 1))
         assert not camera.is_calibrated
-        with pytest.raises(ValueError, match="scale and angle must be known"):
-            camera.project(np.zeros((1, 3)))
+        for use in (camera.project, camera.plane_coordinates):
+            with pytest.raises(ValueError, match="scale and angle must be known, got None"):
+                use(np.zeros((1, 3 if use == camera.project else 2)))
         with pytest.raises(ValueError, match="scale and angle must be known"):
             _ = camera.focal_length
 
@@ -145,16 +127,6 @@ class TestBall:
 
 
 class TestRig:
-    @given(SEEDS, st.integers(2, 6), st.booleans())
-    @settings(max_examples=20)
-    def test_file_round_trip_is_exact(self, tmp_path_factory, seed, cameras, calibrated):
-        _, rig, _, _ = scene(seed, 5, cameras, (OrthographicCamera, PerspectiveCamera))
-        rig = rig if calibrated else rig.uncalibrated(keep=1)
-        path = tmp_path_factory.mktemp("rig") / "rig.toml"
-        rig.save(path)
-        assert Rig.load(path) == rig
-        assert list(map(type, Rig.load(path).cameras)) == list(map(type, rig.cameras))
-
     def test_reads_a_file_written_by_hand(self, tmp_path):
         path = tmp_path / "rig.toml"
         path.write_text(
@@ -276,10 +248,6 @@ class TestReconstruction:
             in_front = reconstruct(tracks, rig) @ camera.matrix[2, :3] + camera.matrix[2, 3]
             assert not (in_front <= 0).any()
 
-    def test_residuals(self, small):
-        _, rig, tracks, _ = small
-        np.testing.assert_allclose(np.hstack(residuals(tracks, rig)), 0, atol=1e-9)
-
     def test_far_away_it_is_that_of_orthographic_cameras(self):
         rng = np.random.default_rng(1)
         x = trajectory(rng, 50)
@@ -301,19 +269,6 @@ class TestReconstruction:
         expected = learn_cameras(tracks, flat.uncalibrated())
         shift = calibration_errors(learned, far) - calibration_errors(expected, flat)
         assert np.abs(shift).max() < 1e-5
-
-    def test_lines_that_meet_nowhere(self):
-        # On the line through both pinholes, and behind both cameras.
-        base = {"scale": 1e-3, "angle": 0, "normal": (0, 0, 1)}
-        rig = Rig(PerspectiveCamera(position=(b, 0, 0), **base) for b in (0, 1))
-        x = np.array([[0.3, 0.2, -5], [0.3, 0.2, -6]])
-        tracks = [camera.project(x) for camera in rig.cameras]
-        tracks[0][1], tracks[1][1] = tracks[1][1].copy(), tracks[0][1].copy()
-        found = reconstruct(tracks, rig)
-        np.testing.assert_allclose(found[0], x[0])
-        assert np.isnan(found[1]).all()
-        parallel = [np.array([[255.5, 255.5]])] * 2
-        assert np.isnan(reconstruct(parallel, rig)).all()
 
 
 def test_a_position_beside_a_perspective_camera_cannot_be_learned():

@@ -15,7 +15,7 @@ from vidsindy_lite.cameras import (
     reconstruct,
     residuals,
 )
-from vidsindy_lite.cameras.triangulate import epipolar_lines, epipolar_rows, intersect
+from vidsindy_lite.cameras.rig import epipolar_lines, epipolar_rows, intersect
 
 
 def scene(*kinds, frames=40, seed=3):

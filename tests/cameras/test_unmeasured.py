@@ -7,11 +7,11 @@ import pytest
 from helpers import aligned_error, room, walk
 
 import vidsindy_lite as vl
-from vidsindy_lite.cameras import AffineCamera, factorised, learn_cameras_eq4, posed, unmeasured
+from vidsindy_lite.cameras import AffineCamera, factorised, learn_cameras_eq4, posed
 from vidsindy_lite.pipeline import observe_tracks
 from vidsindy_lite.study import SYSTEMS
 
-FRAMES = 400
+FRAMES = 240
 
 
 def lenses(rng, rig, off=0.05, **more):
@@ -35,8 +35,7 @@ def filmed(rng, rig, late=(0.0,) * 5, noise=0.5):
     return [track + noise * rng.normal(size=track.shape) for track in tracks]
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("cameras", [3, 4])
+@pytest.mark.parametrize(("seed", "cameras"), [(0, 3), (1, 4)])
 def test_the_path_is_found_but_for_a_similarity(seed, cameras):
     rng = np.random.default_rng([seed, cameras])
     rig = room(rng, cameras)
@@ -123,8 +122,8 @@ def test_small_lags_are_learned_beside():
 def test_a_line_tells_no_rig():
     rng = np.random.default_rng(4)
     rig = room(rng)
-    x = np.outer(np.sin(np.arange(FRAMES) / 40), [0.5, 0.3, 0.2])
-    tracks = [c.project(x) + 0.5 * rng.normal(size=(FRAMES, 2)) for c in rig.cameras]
+    x = np.outer(np.sin(np.arange(400) / 40), [0.5, 0.3, 0.2])
+    tracks = [c.project(x) + 0.5 * rng.normal(size=(400, 2)) for c in rig.cameras]
     warnings = vl.learn_cameras(tracks, lenses(rng, rig)).warnings
     assert any("the search for the cameras did not converge" in text for text in warnings)
 
@@ -221,15 +220,6 @@ def test_what_is_no_rig_of_lenses():
         learn_cameras_eq4([walk(np.arange(20))[:, :2]] * 3, vl.Rig([lens] * 3))
     with pytest.raises(ValueError, match="camera: position must be known"):
         lens.project(np.zeros((1, 3)))
-
-
-def test_of_exact_tracks_some_start_is_exact():
-    """What two cameras see tells where any other one stands; as if from far away, only about."""
-    rng = np.random.default_rng(9)
-    rig = room(rng, 4)
-    starts = unmeasured._starts(filmed(rng, rig, noise=0.0), lenses(rng, rig, off=0.0))
-    missed = sorted(miss for miss, _ in starts)
-    assert missed[0] < 1e-3 < 1 < missed[-1]
 
 
 LAGS = np.array([0.0, 17.4, -8.0, 5.5])

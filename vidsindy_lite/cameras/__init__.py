@@ -3,30 +3,26 @@
 ::
 
     models        the two models of camera, lens and shutter, rotations and planes
-    triangulate   where lines of sight meet, and what each says of the other cameras
-    rig           the cameras that watch one scene, their file, and the path that they see
+    rig           the cameras that watch one scene, their file, and where their lines of sight meet
     files         rigs from the files of other tools
     clocks        tracks at the same instants, whatever the lags, rates and clocks of the videos
-    adjust        bundle adjustment: cameras, clocks and path together, and their covariance
-    eq4           cameras by linear equations, as the paper writes them
+    adjust        bundle adjustment: cameras, clocks and path together; what else would explain them
     unmeasured    rigs of which nothing is known: where they stand, or a path up to an affine map
- 1. synchronise   tracks -> when each camera started (`Lags`)
- 2. calibrate     tracks -> the same `Rig`, with nothing unknown, and its systematic errors
- 3. rig           tracks of a calibrated rig -> path in space, and by how much it misses them
-    causes        why views do not agree: by freeing one thing at a time, or trying what is mistaken
+ 1. calibrate     tracks -> the same `Rig`, with nothing unknown, and its systematic errors
+ 2. synchronise   tracks -> when each camera started (`Lags`), and mistakes in what is given
     targets       who is who among several targets
 
 The other rooms import from here alone.
 """
 
-from .calibrate import calibration_errors, learn_cameras, systematic_errors, trailing_errors
-from .causes import explain, find_mistake, smooth
+from .adjust import explain, smooth
+from .calibrate import calibration_errors, check_learnable, learn_cameras, learn_cameras_eq4
+from .calibrate import systematic_errors, trailing_errors
 from .clocks import Clock, Lags, align, list_lags
-from .eq4 import check_learnable, learn_cameras_eq4, learn_cameras_lbfgs
 from .files import read_calibration
 from .models import AffineCamera, Camera, OrthographicCamera, PerspectiveCamera
 from .models import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance
 from .rig import ALIKE, DISAGREEMENT, GROSS, Rig, disagreement, reconstruct, residuals, rig_template
-from .synchronise import learn_lags
+from .synchronise import find_mistake, learn_lags
 from .targets import identify, side_by_side, stacked
 from .unmeasured import Factorised, factorised, posed

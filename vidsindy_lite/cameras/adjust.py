@@ -31,6 +31,17 @@ with weights w that fall linearly to zero over as many frames as the residuals d
 From few frames S is often too small by chance, and W never is but for such errors: so in every
 direction the larger of both counts.
 
+**Why views do not agree.** `explain` frees one thing at a time. Residuals of a right rig are the
+errors of the tracks. A wrong normal, lens or clock leaves more, which follows the motion; how large
+it may be without a word depends on these errors, and not on a fixed number of pixels. For each
+cause, with slopes C of the residuals r in it (all that is free anyway projected out), the score g =
+C'r is compared with its covariance, in which residuals that depend on their neighbours count for
+what they are worth:
+
+    T = g' Omega^-1 g,      Omega of the residuals that the cause leaves.
+
+A cause that stands out is tried: cameras and path are adjusted with it free.
+
 Newey and West 1987, Econometrica 55; Andrews 1991, Econometrica 59 (the number of frames);
 Triggs et al. 2000, "Bundle adjustment: a modern synthesis".
 """
@@ -38,30 +49,43 @@ Triggs et al. 2000, "Bundle adjustment: a modern synthesis".
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.ndimage import minimum_filter1d
-from scipy.special import gammaincinv
+from scipy.special import fdtri, gammaincinv
 
 from ..arrays import Bools, Floats
 from .clocks import Footage
 from .models import USUAL, Camera, OrthographicCamera, PerspectiveCamera, frozen
-from .triangulate import at_once, intersect
+from .rig import (
+    FINE,
+    GROSS,
+    TRIMMED,
+    Rig,
+    at_once,
+    check_views,
+    decimals,
+    disagreement,
+    intersect,
+    residuals,
+    trimmed,
+)
 
 _UNTOLD = 1e-15  # of the largest information of any direction: rounding
 PARTS = {
-    "normal": slice(0, 2),
-    "angle": slice(2, 3),
-    "scale": slice(3, 4),
-    "position": slice(4, 7),
-    "principal point": slice(7, 9),
-    "distortion": slice(9, 13),
-    "readout": slice(13, 14),
-    "lag": slice(14, 15),
-    "drift": slice(15, 16),
-    "nearness": slice(16, 17),
+    "normal": [0, 1],
+    "angle": [2],
+    "scale": [3],
+    "position": [4, 5, 6],
+    "principal point": [7, 8],
+    "distortion": [9, 10, 11, 12],
+    "readout": [13],
+    "lag": [14],
+    "drift": [15],
+    "nearness": [16],
 }
 """Which components of the vector belong to what."""
 
@@ -83,7 +107,12 @@ _BESIDE = 2  # frames around an outlier into which interpolation carries a part 
 _FLAT = 1e-9  # of the largest pivot; smaller ones leave a point where it is
 # Tried in turn, until a step leads downhill: fine where focal length and distance hardly differ.
 _DAMPING = (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2)
-LAG, DRIFT = PARTS["lag"].start, PARTS["drift"].start
+_CHANCE = 1e-6  # of a T that large without a cause
+_TRIED = 5  # of the causes that stand out most
+_DEGENERATE = 1e-3  # share of a slope that nothing else explains; less tells nothing
+_SMOOTH = 0.3  # correlation of a residual with the next; that of noise is zero
+_ROUNDING = 1e-9  # pixels
+LAG, DRIFT = PARTS["lag"][0], PARTS["drift"][0]
 
 
 def fitted_factor(missed: Floats, slopes: Floats, prior: Floats, noise: float) -> Floats:
@@ -149,7 +178,7 @@ def known_to(given: Camera) -> Floats:
     errors[PARTS["scale"]] = given.scale_error if given.is_calibrated else np.inf
     errors[PARTS["position"]] = given.position_error if given.is_placed else np.inf
     if isinstance(given, OrthographicCamera):
-        errors[PARTS["position"]][2] = 0.0  # it sees the same from anywhere on its axis
+        errors[PARTS["position"][2]] = 0.0  # it sees the same from anywhere on its axis
     errors[PARTS["principal point"]] = given.principal_point_error
     if isinstance(given, PerspectiveCamera):
         errors[PARTS["distortion"]] = given.distortion_error * np.array(
@@ -170,15 +199,6 @@ class NearCamera(OrthographicCamera):
     def _last_row(self) -> Floats:
         away = self.nearness * self.normal
         return np.append(-away, 1 + away @ self.about)
-
-
-def units(width: float, image: float) -> Floats:
-    """Sizes of changes that matter about equally, for a scene and an image of these widths."""
-    sizes = np.ones(SIZE)
-    sizes[PARTS["position"]] = width
-    sizes[PARTS["principal point"]] = image
-    sizes[PARTS["nearness"]] = 1 / width
-    return sizes
 
 
 def changed(camera: Camera, change: Floats) -> Camera:
@@ -209,58 +229,178 @@ def changed(camera: Camera, change: Floats) -> Camera:
     return moved
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Adjustment:
-    """Cameras and clocks of the smallest errors, and what is known of them near by.
+    """Cameras, clocks and path after some change, and what is known of them near by.
 
     Parameters
     ----------
-    cameras : tuple of Camera
-    footage : Footage
-        With its lags and rates.
+    given : Footage
+    start : tuple of Camera
     errors : ndarray, shape (m, SIZE)
-        As they were given.
+        Of the start: zero what is exactly known, infinite what is not at all.
     change : ndarray, shape (m, SIZE)
         Of each camera and its clock, from the start.
     points : ndarray, shape (n, 3)
         NaN where none is found.
-    misses : ndarray, shape (n, 2 m)
-        Residuals, pixels; NaN where nothing is seen or no point is found.
-    weights : ndarray, shape (n,)
-    noise : float
-        sigma, pixels.
-    slopes : ndarray, shape (n, 2 m, p)
-        Of the residuals in the free changes, the points following; zero where nothing is seen.
-    path_slopes : ndarray, shape (n, 3, p)
-        Of the points.
+    reach : float
+        Size of the path, scene units.
     settled : bool
         Whether the search came to its end, after so many ...
     steps : int
     """
 
-    cameras: tuple[Camera, ...]
-    footage: Footage
+    given: Footage
+    start: tuple[Camera, ...]
     errors: Floats
     change: Floats
     points: Floats
-    misses: Floats
-    weights: Floats
-    noise: float
-    slopes: Floats
-    path_slopes: Floats
-    settled: bool
-    steps: int
+    reach: float = 1.0
+    settled: bool = False
+    steps: int = 0
+
+    @cached_property
+    def cameras(self) -> tuple[Camera, ...]:
+        """After the change."""
+        return tuple(map(changed, self.start, self.change))
+
+    @cached_property
+    def footage(self) -> Footage:
+        """With its lags and rates."""
+        lag, drift = self.change[:, LAG], self.change[:, DRIFT]
+        return self.given.later(lag, drift) if lag.any() or drift.any() else self.given
+
+    @cached_property
+    def misses(self) -> Floats:
+        """Residuals, pixels, (n, 2 m); NaN where nothing is seen or no point is found."""
+        pairs = zip(self.cameras, self.footage.aligned, strict=True)
+        missed = np.stack([_missed(camera, track, self.points) for camera, track in pairs], axis=1)
+        seen = np.isfinite(missed).all(axis=-1)
+        missed[~seen | (seen.sum(axis=1) < 2)[:, None]] = np.nan  # one view has no say
+        return missed.reshape(len(missed), -1)
+
+    def left(self, share: float = TRIMMED) -> float:
+        """The worst camera's residual that one frame in ten exceeds, pixels; see `trimmed`."""
+        return max(trimmed(part, share) for part in np.split(self.misses, len(self.start), axis=1))
+
+    @cached_property
+    def noise(self) -> float:
+        """Standard deviation of the errors of the tracks, if most residuals are those of noise.
+
+        Of the 2 m numbers of a frame its point takes three, and leaves the squared length of the
+        others, whose median is that of chi-squared. Numbers one by one would not do: two views err
+        along their epipolar lines without a residual.
+        """
+        freedom = np.isfinite(self.misses).sum(axis=1) - 3
+        squares = np.nansum(self.misses**2, axis=1)[freedom > 0]
+        if not squares.size:
+            return _FINEST
+        expected = 2 * gammaincinv(freedom[freedom > 0] / 2, 0.5)
+        return max(float(np.sqrt(np.median(squares / expected))), _FINEST)
+
+    @cached_property
+    def weights(self) -> Floats:
+        """Of each frame, (n,): one, unless nothing is seen, it is missed by far, ..."""
+        worst = np.nanmax(np.abs(self.misses), axis=1, initial=0.0)
+        weights = np.minimum(1.0, _OUTLIER * self.noise / np.maximum(worst, 1e-300)) ** 2
+        if self.timed and len(weights):  # ... or is beside one, as interpolation carries a part
+            weights = minimum_filter1d(weights, 2 * _BESIDE + 1)
+        return np.where(np.isfinite(self.misses).any(axis=1), weights, 0.0)
+
+    @property
+    def free(self) -> Bools:
+        """What may change, (m, SIZE)."""
+        return self.errors > 0
 
     @property
     def prior(self) -> Floats:
         """Information of the measurements on the free changes, (p,)."""
-        return self.errors[self.errors > 0] ** -2.0
+        return self.errors[self.free] ** -2.0
+
+    @property
+    def timed(self) -> bool:
+        """Whether a clock is unknown."""
+        return bool(self.free[:, [LAG, DRIFT]].any())
+
+    @cached_property
+    def unit(self) -> Floats:
+        """Sizes of changes that matter about equally, (m, SIZE)."""
+        sizes = np.ones(self.errors.shape)
+        sizes[:, PARTS["position"]] = self.reach
+        sizes[:, PARTS["principal point"]] = [[camera.image_size[0]] for camera in self.start]
+        sizes[:, PARTS["nearness"]] = 1 / self.reach
+        return sizes
+
+    @cached_property
+    def reduced(self) -> _Reduced:
+        """Misses and their slopes in the free changes, with the points taken out by QR."""
+        seen = np.isfinite(self.misses)[..., None]
+        in_change, in_points = (np.where(seen, np.nan_to_num(part), 0.0) for part in self._slopes())
+        q, r = np.linalg.qr(in_points)
+        pivots = np.abs(np.diagonal(r, axis1=1, axis2=2))
+        told = pivots.min(axis=1, initial=np.inf) > _FLAT * pivots.max(axis=1, initial=0)
+        q, r = np.where(told[:, None, None], q, 0.0), np.where(told[:, None, None], r, np.eye(3))
+        missed = np.nan_to_num(self.misses)[..., None]
+        of_change, of_misses = (q.swapaxes(1, 2) @ part for part in (in_change, missed))
+        return _Reduced(
+            in_change - q @ of_change,
+            (missed - q @ of_misses)[..., 0],
+            -np.linalg.solve(r, of_misses)[..., 0],
+            -np.linalg.solve(r, of_change),
+            of_misses[..., 0],
+        )
+
+    def _slopes(self) -> tuple[Floats, Floats]:
+        """Slopes of the misses in the free changes, (n, 2 m, p), and in the points, (n, 2 m, 3)."""
+        free = np.argwhere(self.free)
+        in_change = np.zeros((*self.misses.shape, len(free)))
+        for k, (i, part) in enumerate(free):
+            columns = slice(2 * i, 2 * i + 2)
+            if part in (LAG, DRIFT):
+                in_change[:, columns, k] = self.footage.slopes(i)[int(part == DRIFT)]
+                continue
+            step = _PROBE * self.unit[i, part] * np.eye(SIZE)[part]
+            ends = [changed(self.start[i], self.change[i] + sign * step) for sign in (1, -1)]
+            high, low = (_missed(c, self.footage.aligned[i], self.points) for c in ends)
+            in_change[:, columns, k] = (high - low) / (2 * step[part])
+        probe = _PROBE * self.reach
+        in_points = np.stack([
+            np.hstack([c.image(self.points - e) - c.image(self.points + e) for c in self.cameras])
+            / (2 * probe)
+            for e in probe * np.eye(3)
+        ], axis=-1)  # fmt: skip
+        return in_change, in_points
 
     @property
     def weighed(self) -> tuple[Floats, Floats]:
         """Residuals and slopes times the roots of the weights, zero where nothing is seen."""
         root = np.sqrt(self.weights)[:, None]
-        return root * np.nan_to_num(self.misses), root[..., None] * self.slopes
+        return root * np.nan_to_num(self.misses), root[..., None] * self.reduced.slopes
+
+    @property
+    def factor(self) -> Floats:
+        """`fitted_factor` of the free changes."""
+        return fitted_factor(*self.weighed, self.prior, self.noise)
+
+
+class _Reduced(NamedTuple):
+    """Slopes, (n, 2 m, p), and misses, (n, 2 m), with the points taken out.
+
+    The points move by `own`, (n, 3), to where they are missed least, and with the changes by
+    `follow`, (n, 3, p); a point that its views do not tell stays. `along`, (n, 3), is what of the
+    misses they take up.
+    """
+
+    slopes: Floats
+    misses: Floats
+    own: Floats
+    follow: Floats
+    along: Floats
+
+
+def _missed(camera: Camera, track: Floats, points: Floats) -> Floats:
+    """By how much the images of points miss a track, (n, 2)."""
+    return camera.steadied(track) - camera.image(points)
 
 
 def adjust(
@@ -286,169 +426,31 @@ def adjust(
         Steps; with none, what is known near cameras that were adjusted before.
     """
     change = np.zeros(errors.shape) if begin is None else begin
-    problem, state = _Problem.of(footage, start, errors, change)
-    noise = _noise(state.misses)
-    settled, steps, earlier = False, 0, np.full(errors.shape, np.inf)
-    while not settled and steps < most:
-        moved, step = _downhill(problem, state, noise)
-        steps += 1
+    state = Adjustment(footage, tuple(start), errors, change, np.zeros((0, 3)))
+    points, _ = intersect(state.cameras, at_once(state.cameras, state.footage.aligned))
+    seen = points[np.isfinite(points).all(axis=1)]
+    reach = (float(np.sqrt(np.mean(np.var(seen, axis=0)))) if len(seen) else 1.0) or 1.0
+    state = replace(state, points=points, reach=reach)
+    earlier = np.full(errors.shape, np.inf)
+    while not state.settled and state.steps < most:
+        moved, step = _downhill(state)
         if moved is None:  # rounding is all that is left, or points ran out of numbers
-            settled = step == 0
+            state.settled, state.steps = step == 0, state.steps + 1
             break
         # A frame at the end of a video may come and go with a lag, for ever.
-        back = (np.abs(moved.change - earlier) <= _PROBE * problem.unit).all()
-        earlier, state, before = state.change, moved, noise
-        noise = _noise(state.misses)
-        enough = max(_SETTLED, (_IN_TIME if problem.timed else _ENOUGH) * noise)
-        still = step <= enough or bool(problem.timed and back)
-        settled = still and noise >= before * (1 - 1e-3)
-    reduced = _Reduced.of(*problem.slopes(state), state.misses)
-    return Adjustment(
-        state.cameras, state.footage, errors, state.change, state.points, state.misses,
-        problem.weights(state, noise), noise, reduced.slopes, reduced.follow, settled, steps,
-    )  # fmt: skip
+        back = (np.abs(moved.change - earlier) <= _PROBE * state.unit).all()
+        enough = max(_SETTLED, (_IN_TIME if state.timed else _ENOUGH) * moved.noise)
+        still = step <= enough or (state.timed and back)
+        moved.settled = bool(still and moved.noise >= state.noise * (1 - 1e-3))
+        moved.steps, earlier, state = state.steps + 1, state.change, moved
+    return state
 
 
-@dataclass(frozen=True)
-class _State:
-    """Changes, (m, SIZE), points, (n, 3), cameras, clocks, and by how much they miss the tracks."""
-
-    change: Floats
-    points: Floats
-    cameras: tuple[Camera, ...]
-    footage: Footage
-    misses: Floats
-
-
-@dataclass(frozen=True)
-class _Problem:
-    """What was filmed, the start, and what is free of it."""
-
-    footage: Footage
-    start: tuple[Camera, ...]
-    errors: Floats
-    unit: Floats  # of each change, (m, SIZE), and ...
-    reach: float  # ... of points
-
-    @classmethod
-    def of(
-        cls, footage: Footage, start: Sequence[Camera], errors: Floats, change: Floats
-    ) -> tuple[_Problem, _State]:
-        """Units from the size of the path, and the first state."""
-        blank = cls(footage, tuple(start), errors, errors, 1.0)
-        cameras, moved = blank.changed(change)
-        points, _ = intersect(cameras, at_once(cameras, moved.aligned))
-        seen = points[np.isfinite(points).all(axis=1)]
-        reach = (float(np.sqrt(np.mean(np.var(seen, axis=0)))) if len(seen) else 1.0) or 1.0
-        sizes = np.array([units(reach, float(camera.image_size[0])) for camera in start])
-        problem = replace(blank, unit=sizes, reach=reach)
-        return problem, problem.at(change, points)
-
-    @property
-    def free(self) -> Bools:
-        """What may change, (m, SIZE)."""
-        return self.errors > 0
-
-    @property
-    def prior(self) -> Floats:
-        """The inverse of the errors of what is free, (p,)."""
-        return 1 / self.errors[self.free]
-
-    @property
-    def timed(self) -> bool:
-        """Whether a clock is unknown."""
-        return bool(self.errors[:, [LAG, DRIFT]].any())
-
-    def changed(self, change: Floats) -> tuple[tuple[Camera, ...], Footage]:
-        """Cameras and clocks after changes."""
-        pairs = zip(self.start, change, strict=True)
-        moved = self.footage
-        if change[:, [LAG, DRIFT]].any():
-            moved = moved.later(change[:, LAG], change[:, DRIFT])
-        return tuple(changed(camera, part) for camera, part in pairs), moved
-
-    def at(self, change: Floats, points: Floats) -> _State:
-        """What the cameras miss after a change."""
-        cameras, footage = self.changed(change)
-        pairs = zip(cameras, footage.aligned, strict=True)
-        missed = np.stack([c.steadied(track) - c.image(points) for c, track in pairs], axis=1)
-        seen = np.isfinite(missed).all(axis=-1)
-        missed[~seen | (seen.sum(axis=1) < 2)[:, None]] = np.nan  # one view has no say
-        return _State(change, points, cameras, footage, missed.reshape(len(points), -1))
-
-    def weights(self, state: _State, noise: float) -> Floats:
-        """Of each frame, (n,): one, unless nothing is seen, it is missed by far, ..."""
-        worst = np.nanmax(np.abs(state.misses), axis=1, initial=0.0)
-        weights = np.minimum(1.0, _OUTLIER * noise / np.maximum(worst, 1e-300)) ** 2
-        if self.timed and len(weights):  # ... or is beside one, as interpolation carries a part
-            weights = minimum_filter1d(weights, 2 * _BESIDE + 1)
-        return np.where(np.isfinite(state.misses).any(axis=1), weights, 0.0)
-
-    def slopes(self, state: _State) -> tuple[Floats, Floats]:
-        """Slopes of the misses in the free changes, (n, 2 m, p), and in the points, (n, 2 m, 3)."""
-        free = np.argwhere(self.free)
-        in_change = np.zeros((*state.misses.shape, len(free)))
-        for k, (i, part) in enumerate(free):
-            columns = slice(2 * i, 2 * i + 2)
-            if part in (LAG, DRIFT):
-                in_change[:, columns, k] = state.footage.slopes(i)[int(part == DRIFT)]
-                continue
-            step = np.zeros(SIZE)
-            step[part] = _PROBE * self.unit[i, part]
-            ends = [changed(self.start[i], state.change[i] + sign * step) for sign in (1, -1)]
-            track = state.footage.aligned[i]
-            high, low = (c.steadied(track) - c.image(state.points) for c in ends)
-            in_change[:, columns, k] = (high - low) / (2 * step[part])
-        probe = _PROBE * self.reach
-        in_points = np.stack([
-            np.hstack([c.image(state.points - e) - c.image(state.points + e)
-                       for c in state.cameras]) / (2 * probe)
-            for e in probe * np.eye(3)
-        ], axis=-1)  # fmt: skip
-        seen = np.isfinite(state.misses)[..., None]
-        in_change, in_points = np.nan_to_num(in_change), np.nan_to_num(in_points)
-        return np.where(seen, in_change, 0.0), np.where(seen, in_points, 0.0)
-
-
-@dataclass(frozen=True)
-class _Reduced:
-    """Slopes, (n, 2 m, p), and misses, (n, 2 m), with the points taken out.
-
-    The points move by `own`, (n, 3), to where they are missed least, and with the changes by
-    `follow`, (n, 3, p); a point that its views do not tell stays. `along`, (n, 3), is what of the
-    misses they take up.
-    """
-
-    slopes: Floats
-    misses: Floats
-    own: Floats
-    follow: Floats
-    along: Floats
-
-    @classmethod
-    def of(cls, in_change: Floats, in_points: Floats, misses: Floats) -> _Reduced:
-        """By QR, frame by frame."""
-        q, r = np.linalg.qr(in_points)
-        pivots = np.abs(np.diagonal(r, axis1=1, axis2=2))
-        told = pivots.min(axis=1, initial=np.inf) > _FLAT * pivots.max(axis=1, initial=0)
-        q, r = np.where(told[:, None, None], q, 0.0), np.where(told[:, None, None], r, np.eye(3))
-        across = q.swapaxes(1, 2)
-        missed = np.nan_to_num(misses)[..., None]
-        of_change, of_misses = across @ in_change, across @ missed
-        return cls(
-            in_change - q @ of_change,
-            (missed - q @ of_misses)[..., 0],
-            -np.linalg.solve(r, of_misses)[..., 0],
-            -np.linalg.solve(r, of_change),
-            of_misses[..., 0],
-        )
-
-
-def _downhill(problem: _Problem, state: _State, noise: float) -> tuple[_State | None, float]:
+def _downhill(state: Adjustment) -> tuple[Adjustment | None, float]:
     """The state after a step that lessens the errors, and how far it moved images, pixels."""
-    weights, sigma = problem.weights(state, noise), max(noise, _PRIOR_NOISE)
-    reduced = _Reduced.of(*problem.slopes(state), state.misses)
-    root, prior, free = np.sqrt(weights)[:, None] / sigma, problem.prior, problem.free
+    weights, sigma, reduced = state.weights, max(state.noise, _PRIOR_NOISE), state.reduced
+    free, prior = state.free, np.sqrt(state.prior)
+    root = np.sqrt(weights)[:, None] / sigma
     rows = np.vstack(((root[..., None] * reduced.slopes).reshape(-1, len(prior)), np.diag(prior)))
     target = -np.append((root * reduced.misses).ravel(), prior * state.change[free])
     size = np.sqrt(np.sum(rows**2, axis=0))
@@ -460,10 +462,10 @@ def _downhill(problem: _Problem, state: _State, noise: float) -> tuple[_State | 
     lags = np.argwhere(free)[:, 1] == LAG
     seen = np.isfinite(state.misses)
 
-    def cost(other: _State) -> float:
+    def cost(other: Adjustment) -> float:
         """What is to be smallest; infinite if points that were seen before would not be."""
         lost = ~np.isfinite(other.misses[seen])
-        if lost.any() and lost.mean() > (_LOST if problem.timed else 0.0):
+        if lost.any() and lost.mean() > (_LOST if state.timed else 0.0):
             return np.inf
         squares = np.nansum(np.where(seen, other.misses, 0.0) ** 2, axis=1)
         off = prior * other.change[free]
@@ -474,27 +476,174 @@ def _downhill(problem: _Problem, state: _State, noise: float) -> tuple[_State | 
         damped = np.vstack((triangle, np.sqrt(damping) * np.eye(len(size))))
         step = np.linalg.lstsq(damped, aim, rcond=1e-13)[0] / size
         step /= max(np.abs(step[lags]).max(initial=0) / _LONGEST, 1.0)
-        change = state.change.copy()
+        change, points = state.change.copy(), state.points + reduced.own + reduced.follow @ step
         change[free] += step
-        moved = problem.at(change, state.points + reduced.own + reduced.follow @ step)
+        moved = replace(state, change=change, points=points)
         if cost(moved) <= here * (1 + 1e-12) + 1e-18:
             told = seen.any(axis=1)
             shift = np.sqrt(np.mean((reduced.slopes[told] @ step) ** 2)) if told.any() else 0.0
-            late = noise * np.abs(step[lags]).max(initial=0)
+            late = state.noise * np.abs(step[lags]).max(initial=0)
             return moved, float(max(shift, late, np.abs(reduced.along).max(initial=0)))
     return None, 0.0
 
 
-def _noise(misses: Floats) -> float:
-    """Standard deviation of the errors of the tracks, if most residuals are those of noise.
+@dataclass(frozen=True)
+class Cause:
+    """Something that may be wrong of some cameras: which components of their changes."""
 
-    Of the 2 m numbers of a frame its point takes three, and leaves the squared length of the
-    others, whose median is that of chi-squared. Numbers one by one would not do: two views err
-    along their epipolar lines without a residual.
+    what: str
+    cameras: tuple[int, ...]
+    parts: Sequence[int]
+
+    def mask(self, count: int) -> Bools:
+        """The freed components, (m, SIZE)."""
+        freed = np.zeros((count, SIZE), bool)
+        freed[np.ix_(self.cameras, self.parts)] = True
+        return freed
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A cause, and the cameras that it leads to."""
+
+    cause: Cause
+    found: Adjustment
+
+    @property
+    def left(self) -> float:
+        """`disagreement` of the worst camera of these, pixels."""
+        return self.found.left()
+
+    def text(self, names: Sequence[str]) -> str:
+        """What would explain the residuals best, with its value."""
+        i, what = self.cause.cameras[0], self.cause.what
+        camera, change = self.found.cameras[i], self.found.change[i]
+        one = f"cameras[{i}] ({names[i]})"
+        whose = one if len(self.cause.cameras) == 1 else "all cameras"
+        parts = {
+            "normal": f"the normal ({decimals(camera.normal)}) of {whose}",
+            "position": f"the position ({decimals(np.asarray(camera.position))}) of {whose}",
+            "scale": f"a scale {100 * np.expm1(change[PARTS['scale']][0]):+.2g} % off of {whose}",
+            "distortion": f"a distortion of the lens of {whose}, for {one} k1 off "
+            f"by {change[PARTS['distortion']][0]:.2g},",
+            "readout": f"a rolling shutter of {whose}, for {one} a readout of {camera.readout:.2g} "
+            "frames,",
+            "lag": f"a lag of {names[i]} that is off by {change[PARTS['lag']][0]:.2f} frames",
+            "drift": f"another clock of {names[i]}, {abs(change[PARTS['drift']][0]):.2g} frames "
+            f"{'slow' if change[PARTS['drift']][0] > 0 else 'fast'} over the whole video,",
+            "nearness": "perspective, where the cameras are taken as orthographic, for "
+            f"{one} a distance of {1 / max(abs(change[PARTS['nearness']][0]), 1e-12):.3g},",
+        }
+        return parts[what]
+
+
+def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Explanation | None:
+    """The one thing that explains best what the views leave; None if nothing stands out.
+
+    Parameters
+    ----------
+    tracks : sequence of ndarray, shape (n, 2)
+        One per camera, at the same instants.
+    given, learned : Rig
+        Before and after `learn_cameras`.
     """
-    freedom = np.isfinite(misses).sum(axis=1) - 3
-    squares = np.nansum(misses**2, axis=1)[freedom > 0]
-    if not squares.size:
-        return _FINEST
-    expected = 2 * gammaincinv(freedom[freedom > 0] / 2, 0.5)
-    return max(float(np.sqrt(np.median(squares / expected))), _FINEST)
+    views = check_views(tracks, learned)
+    errors = np.array([known_to(camera) for camera in given.cameras])
+    points, _ = intersect(learned.cameras, views)
+    seen = np.isfinite(points).all(axis=1)
+    if not seen.any():
+        return None
+    far = smooth(tracks, learned) and max(disagreement(tracks, learned)) > GROSS
+    start = [_near(camera, points[seen].mean(axis=0)) for camera in learned.cameras]
+    causes = [c for c in _causes(start) if (c.mask(len(start)) & (errors == 0)).any()]
+    footage = Footage.of(tracks)
+    near = adjust(footage, start, np.where(errors > 0, errors, np.inf), most=0)
+    sizes = [_sizes(near, errors, cause) for cause in causes]
+    # Where views are far apart, and no noise makes it, no test is needed.
+    rank = [explained if far else evidence for evidence, explained in sizes]
+    tried = [causes[k] for k in np.argsort(rank)[::-1][:_TRIED] if rank[k] > (0 if far else 1)]
+    best: tuple[float, Explanation] | None = None
+    for cause in tried:
+        freed = cause.mask(len(start))
+        found = adjust(footage, start, np.where(freed, np.inf, errors))
+        used = np.isfinite(found.misses)
+        left = float(np.sum((np.sqrt(found.weights)[:, None] * found.misses)[used] ** 2))
+        count = used.sum()
+        price = count * np.log(max(left, _ROUNDING)) + freed.sum() * np.log(count)
+        if best is None or price < best[0]:
+            best = price, Explanation(cause, found)
+    return None if best is None else best[1]
+
+
+def smooth(tracks: Sequence[Floats], learned: Rig) -> bool:
+    """Whether residuals follow the motion, which noise of the tracks does not."""
+    missed = np.hstack(residuals(tracks, learned))
+    both = np.isfinite(missed[1:]) & np.isfinite(missed[:-1])
+    limit = np.nanquantile(np.abs(missed), TRIMMED) if both.any() else 0.0
+    before, after = (np.clip(part[both], -limit, limit) for part in (missed[:-1], missed[1:]))
+    return bool(before @ after > _SMOOTH * np.sqrt((before @ before) * (after @ after)))
+
+
+def _causes(cameras: Sequence[Camera]) -> list[Cause]:
+    """All that is tried; a lens and a shutter of one camera, and of all as of one make."""
+    every = tuple(range(len(cameras)))
+    flat = tuple(i for i in every if isinstance(cameras[i], OrthographicCamera))
+    pinholes = tuple(i for i in every if i not in flat)
+    found = [
+        Cause(what, (i,), PARTS[what][: 2 if i in flat else None])
+        for what in ("normal", "position", "scale", "readout", "lag", "drift")
+        for i in every
+    ]
+    lens = PARTS["distortion"][:2]  # k1 and k2: few motions tell more
+    found += [Cause("distortion", (i,), lens) for i in pinholes]
+    found.append(Cause("readout", every, PARTS["readout"]))
+    if pinholes:
+        found.append(Cause("distortion", pinholes, lens))
+    if flat:  # the scale is then that of another distance
+        found.append(Cause("nearness", flat, PARTS["nearness"] + PARTS["scale"]))
+    return found
+
+
+def _near(camera: Camera, about: Floats) -> Camera:
+    """The same camera, ready to be not infinitely far if it is orthographic."""
+    if not isinstance(camera, OrthographicCamera):
+        return camera
+    values = {part.name: getattr(camera, part.name) for part in fields(camera)}
+    return NearCamera(about=about, **values)
+
+
+def _sizes(near: Adjustment, errors: Floats, cause: Cause) -> tuple[float, float]:
+    """T over what chance may make it, zero if it would not matter; pixels that it explains."""
+    missed, slopes = near.weighed
+    free, wanted = errors[near.errors > 0] > 0, cause.mask(len(errors))[near.errors > 0]
+    own = slopes[..., wanted & ~free]
+    flat, target = own.reshape(-1, own.shape[-1]), missed.ravel()
+    size = np.sqrt(np.sum(flat**2, axis=0))
+    flat, size = flat[:, size > 0], size[size > 0]
+    if not size.size:
+        return 0.0, 0.0
+    prior = near.noise / errors[near.errors > 0][free]
+    others = np.vstack((slopes[..., free].reshape(len(flat), -1), np.diag(prior)))
+    padded = np.vstack((flat / size, np.zeros((len(prior), len(size)))))
+    if free.any():
+        solved = np.linalg.lstsq(others, padded, rcond=1e-10)[0]
+        padded = padded - others @ solved
+    left, singular, _ = np.linalg.svd(padded, full_matrices=False)
+    left = left[: len(flat), singular > _DEGENERATE]
+    if not left.shape[1]:
+        return 0.0, 0.0
+    score = left.T @ target
+    rest = (target - left @ score).reshape(missed.shape)
+    each = np.einsum("nmk,nm->nk", left.reshape(*missed.shape, -1), rest)
+    covariance = long_run_covariance(each) * len(each)
+    covariance += _ROUNDING**2 * np.eye(len(covariance))
+    explained = float(np.linalg.norm(score) / np.sqrt(np.isfinite(near.misses).sum()))
+    # Bartlett's weights of that width leave as many degrees of freedom (2/3 is their square's
+    # integral) to estimate Omega with: Hotelling's T.
+    degrees = 1.5 * len(each) / (bandwidth(each) + 1)
+    rest_degrees = degrees - len(score) + 1
+    if explained < FINE or rest_degrees <= 0:
+        return 0.0, explained
+    chance = float(fdtri(len(score), rest_degrees, 1 - _CHANCE))
+    limit = chance * len(score) * degrees / rest_degrees
+    return float(score @ np.linalg.solve(covariance, score)) / limit, explained

@@ -1,7 +1,14 @@
 """Calibration: cameras learned from tracks of one moving target, and what they do to the path.
 
-The cameras of linear equations (`eq4`), or those that stand where nothing was measured
-(`unmeasured`), are the start of a search for the smallest reprojection error in pixels (`adjust`).
+The views of two cameras agree on a point if one linear equation holds, the epipolar one, of what is
+not known of one of them: (s cos theta, s sin theta), and Delta_c if it is orthographic. So cameras
+are found from those that are known, one after the other and without a starting guess; where nothing
+was measured, they stand where `unmeasured` finds them. From there a search goes to the smallest
+reprojection error in pixels (`adjust`).
+
+In Eq. (4) by itself, to compare `learn_cameras` with, the views of the uncalibrated cameras predict
+those of the calibrated ones, R^-_known pinv(R^-_unknown) y_unknown = y_known, in the frames in
+which all cameras see the target: a linear equation as well.
 
 What is learned is not exact. A wrong angle of 1e-4 turns the whole path by about as much: an error
 far below the noise of a frame, but shared by all frames, so that it does not average out. A law
@@ -16,32 +23,273 @@ Paper: Section "Coordinates Transformation", Eq. (4), (5).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats
-from .adjust import PARTS, adjust, fitted_factor, known_to
-from .clocks import Curve, Footage, Lags, check_clocks
-from .eq4 import Unknowns, check_learnable, closed_form
-from .rig import Rig, check_calibrated, check_seen, check_views
-from .triangulate import at_once, intersect, missed
+from ..arrays import Floats, Ints
+from ..checks import check_instance
+from .adjust import DRIFT, LAG, PARTS, adjust, known_to
+from .clocks import Footage, Lags, check_clocks
+from .models import Camera, all_orthographic, independent
+from .rig import (
+    Rig,
+    at_once,
+    check_calibrated,
+    check_seen,
+    check_views,
+    epipolar_lines,
+    epipolar_rows,
+    intersect,
+    missed,
+)
 from .unmeasured import posed
 
 _TOO_FAR = 5.0  # standard errors that a measurement may be off
 _TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1
+# A frame that is missed by more than so many robust standard deviations holds an outlier.
+_OUTLIER = 8.0
+_ROUNDING = 1e-6  # pixels; missing by less is no disagreement
+_ROUNDS = 20  # of weighing equations, for the least absolute misses
+# Motion must tell by so many times the misfit in countless frames, and over sqrt(n) more in n.
+_TELLING, _FEW = 1.45, 8.0
+
+
+class Equations(NamedTuple):
+    """Linear equations design @ p = target, (k, p) and (k,), and the frame of each, (k,).
+
+    p holds (s cos theta, s sin theta) of the cameras that are not calibrated, then Delta_c of one
+    that is not placed, divided by the half width of its image: so all of the design is in pixels.
+    """
+
+    design: Floats
+    target: Floats
+    frames: Ints
+
+
+def _epipolar(tracks: Sequence[Floats], cameras: Sequence[Camera], i: int) -> Equations:
+    """The equations for what is unknown of a camera, with all that are calibrated.
+
+    Where one of these stands is not known either, its equations are off by a constant.
+    """
+    camera = cameras[i]
+    others = [j for j, known in enumerate(cameras) if known.is_calibrated and j != i]
+    loose = [j for j in others if not cameras[j].is_placed]
+    free = [not camera.is_calibrated] * 2 + [not camera.is_placed] * 2 + [True] * len(loose)
+    values = np.append(camera.scaled_turn, np.zeros(2 + len(loose)))
+    parts = [(np.zeros((0, len(free))), np.zeros(0), np.zeros(0, int))]
+    for j in others:
+        lines = epipolar_lines(cameras[j].somewhere, tracks[j], camera.somewhere)
+        design, target = epipolar_rows(lines, camera, tracks[i])
+        constants = np.tile(np.equal(loose, j), (len(design), 1))
+        moves = np.hstack((lines[0][:, ::-1] * [-1, 1], constants))
+        design = np.hstack((design, camera.image_size[0] / 2 * moves))
+        told = np.flatnonzero(np.isfinite(design).all(axis=1) & np.isfinite(target))
+        parts.append((design[told], (target - design @ values)[told], told))
+    design, target, frames = map(np.concatenate, zip(*parts, strict=True))
+    return Equations(design[:, free], target, frames)
+
+
+def _without_outliers(every: Equations, scale: float) -> Equations:
+    """The frames of which the fit of the least absolute misses, in pixels, misses none by far."""
+    missed = np.ones(len(every.target))
+    for _ in range(_ROUNDS):
+        root = np.sqrt(np.maximum(missed, _ROUNDING))
+        solution = np.linalg.lstsq(every.design / root[:, None], every.target / root)[0]
+        missed = np.abs(every.design @ solution - every.target) / scale
+    limit = max(_OUTLIER * 1.4826 * np.median(missed), _ROUNDING) if len(missed) else 0.0
+    good = ~np.isin(every.frames, every.frames[missed > limit])
+    return Equations(every.design[good], every.target[good], every.frames[good])
+
+
+def _solved(
+    equations: Equations, cameras: Sequence[Camera], asked: Sequence[int], checked: bool = True
+) -> Floats:
+    """What is unknown of the first of some cameras or of all, or an error that names them.
+
+    The design is in pixels: a singular value over sqrt(n) is the motion, in pixels rms, that tells
+    one combination of the parameters. Noise on a target that does not move makes 0.6-1.4 times the
+    misfit of it, and somewhat more in few frames. That is not asked for unless `checked`: it would
+    not hold at a wrong lag, nor with a wrong normal.
+    """
+    design, target, _ = equations
+    turned = all(cameras[i].is_calibrated for i in asked)
+    placed = all(cameras[i].is_placed for i in asked)
+    wanted = "position" if turned else "scale and angle" if placed else "scale, angle and position"
+    if len(design) < design.shape[1]:
+        raise ValueError(
+            f"tracks: frames with common views must give at least {design.shape[1]} equations "
+            f"for {wanted} of {_names(asked)}, got {len(design)}"
+        )
+    solution = np.linalg.lstsq(design, target)[0].astype(float)
+    scale = cameras[asked[0]].scale or np.linalg.norm(solution[:2])
+    misfit = np.sqrt(np.mean((design @ solution - target) ** 2)) / scale if scale > 0 else np.inf
+    motion = np.linalg.svd(design, compute_uv=False) / np.sqrt(len(design))
+    # What is missed by measurements is no noise; a later search takes these for what they are.
+    measured = any(any(camera.errors.values()) for camera in cameras)
+    asked_for = min(2.5, _TELLING + _FEW / np.sqrt(len(design))) * misfit
+    if checked and motion[-1] <= max(1e-9 * motion[0], 0.0 if measured else asked_for):
+        raise ValueError(
+            f"tracks: the target's motion must determine {wanted} of "
+            f"{_names(asked)}, got {motion[-1]:.2g} px rms of telling motion against a misfit of "
+            f"{misfit:.2g} px (a static target, a wrong position or normal, videos in another "
+            "order than the cameras, or of other motions)"
+        )
+    return solution
+
+
+def closed_form(
+    tracks: Sequence[Floats], cameras: Sequence[Camera], checked: bool = True
+) -> tuple[Camera, ...]:
+    """Cameras of linear equations.
+
+    Between two cameras that are both unknown, the epipolar constraint is not linear; so a camera
+    waits until one that shares frames with it is known.
+
+    Raises
+    ------
+    ValueError
+        If the tracks leave a camera open; see `_solved` for `checked`.
+    """
+    cameras, scale = tuple(cameras), _known_scale(cameras)
+    while waiting := [
+        i for i, camera in enumerate(cameras) if not (camera.is_calibrated and camera.is_placed)
+    ]:
+        found, failed = {}, []
+        for i in waiting:
+            equations = _without_outliers(_epipolar(tracks, cameras, i), scale)
+            try:
+                # If none can be found, the error of the first names all of them.
+                others = [j for j in waiting if j != i]
+                found[i] = _filled(cameras[i], _solved(equations, cameras, [i, *others], checked))
+            except ValueError as error:
+                failed.append(error)
+        if not found:
+            raise failed[0]
+        cameras = tuple(found.get(i, camera) for i, camera in enumerate(cameras))
+    return cameras
+
+
+def _known_scale(cameras: Sequence[Camera]) -> float:
+    """The mean scale of those that are calibrated."""
+    return float(np.mean([camera.scale for camera in cameras if camera.scale is not None]))
+
+
+def _filled(camera: Camera, solution: Floats) -> Camera:
+    """A camera with what was unknown of it."""
+    if not camera.is_calibrated:
+        turned, solution = solution[:2], solution[2:]
+        camera = camera.calibrated(complex(*turned))
+    return camera if camera.is_placed else camera.placed(camera.image_size[0] / 2 * solution[:2])
+
+
+def _names(indices: Iterable[int]) -> str:
+    """Cameras as errors call them."""
+    return " and ".join(f"cameras[{i}]" for i in indices)
+
+
+def check_learnable(rig: Rig) -> None:
+    """That enough is known of the cameras of a rig to learn the rest.
+
+    Raises
+    ------
+    ValueError
+        If it is not.
+    """
+    check_instance("rig", rig, Rig)
+    if len(rig.cameras) < 2:
+        raise ValueError("rig: must hold two or more cameras, got 1, which sees no depth")
+    if not rig.is_measured:
+        return
+    if not any(camera.is_calibrated for camera in rig.cameras):
+        raise ValueError(
+            "rig: at least one camera must be calibrated (scale and angle given) to learn the "
+            f"others, got none of {len(rig.cameras)}"
+        )
+    loose = [i for i, camera in enumerate(rig.cameras) if not camera.is_placed]
+    if loose and not all_orthographic(rig.cameras):
+        raise ValueError(
+            "rig: all positions must be given if a camera is perspective, got none of "
+            f"{_names(loose)}"
+        )
+    placed = [camera for camera in rig.cameras if camera.is_placed]
+    if loose and not independent(placed):
+        raise ValueError(
+            "rig: the positions of two cameras with independent normals must be given to learn "
+            f"those of {_names(loose)}, got {len(placed)}"
+        )
+
+
+def learn_cameras_eq4(tracks: Sequence[Floats], rig: Rig) -> Rig:
+    """Learn scales and angles by Eq. (4) in closed form.
+
+    Eq. (4) is linear in (s cos theta, s sin theta). It leaves out the epipolar constraint between
+    uncalibrated cameras, and its misfit is not the error of pixels.
+
+    Parameters
+    ----------
+    tracks, rig
+        See `learn_cameras`. All cameras are orthographic and placed, and two of the uncalibrated
+        ones have independent normals.
+
+    Returns
+    -------
+    Rig
+        The same cameras, all calibrated.
+
+    Raises
+    ------
+    ValueError
+        See `learn_cameras`.
+    """
+    check_learnable(rig)
+    if not rig.is_measured:
+        raise ValueError("rig: Eq. (4) needs all positions, got none; use learn_cameras")
+    views, cameras = np.stack(check_views(tracks, rig)), rig.cameras
+    known, unknown = ([i for i, c in enumerate(cameras) if c.is_calibrated == k] for k in (1, 0))
+    loose = [i for i, camera in enumerate(cameras) if not camera.is_placed]
+    if not (unknown or loose):
+        return rig
+    if loose:
+        raise ValueError(
+            f"rig: Eq. (4) needs all positions, got none of {_names(loose)}; use learn_cameras"
+        )
+    if not all_orthographic(cameras):
+        raise ValueError("rig: Eq. (4) needs orthographic cameras, got a perspective one")
+    if not independent([cameras[i] for i in unknown]):
+        raise ValueError(
+            "rig: Eq. (4) needs two independent normals among the uncalibrated cameras, got "
+            f"{[cameras[i].normal.tolist() for i in unknown]}; use learn_cameras"
+        )
+    frames = np.flatnonzero(np.isfinite(views).all(axis=(0, 2)))
+    others = np.vstack([cameras[i].rows for i in unknown])
+    predict = np.vstack([cameras[i].rows for i in known]) @ np.linalg.pinv(others)
+    target = np.hstack([cameras[i].plane_coordinates(views[i][frames]) for i in known])
+    design = []
+    for i, block in zip(unknown, np.split(predict, len(unknown), axis=1), strict=True):
+        x, y = cameras[i].centred(views[i][frames]).T
+        # s T(theta) (X, Y) = [[X, Y], [Y, -X]] p
+        design.append(np.einsum("qa,abf->fqb", block, np.array([[x, y], [y, -x]])))
+        target = target - cameras[i].offset @ block.T
+    every = Equations(
+        np.concatenate(design, axis=2).reshape(target.size, 2 * len(unknown)), target.ravel(),
+        np.repeat(frames, target.shape[1]),
+    )  # fmt: skip
+    kept = _without_outliers(every, _known_scale(cameras))
+    values = _solved(kept, cameras, unknown).reshape(-1, 2)
+    found = {i: _filled(cameras[i], value) for i, value in zip(unknown, values, strict=True)}
+    return Rig(tuple(found.get(i, camera) for i, camera in enumerate(cameras)))
 
 
 def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     """Learn what is not known of the cameras from tracks of one moving target.
 
-    In (s cos theta, s sin theta) of the unknown cameras and Delta_c of those without a position,
-    the condition that all views agree on one point is linear, so no starting guess is needed. Used
-    are every equation that does not hold the unknown point, among them the epipolar constraint
-    between uncalibrated cameras that Eq. (4) leaves out, and every frame with two or more views.
-    This closed form is then refined to the smallest reprojection error in pixels, which removes the
-    bias that pixel noise causes in a scale. With a perspective camera in the rig, the closed form
-    goes from the known cameras to the others, and the refinement is the same.
+    In (s cos theta, s sin theta) of an unknown camera and Delta_c of one without a position, the
+    condition that its view and those of known cameras agree on one point is linear, so no starting
+    guess is needed. This closed form is then refined to the smallest reprojection error in pixels,
+    in every frame with two or more views: that holds the epipolar constraint between uncalibrated
+    cameras, too, which Eq. (4) leaves out, and has no bias of the scale by pixel noise.
 
     What was measured with an error (`normal_error` and so on, see `Camera`) may change, too, by as
     much as that: the refinement is a bundle adjustment of cameras and path with the measurements as
@@ -87,7 +335,7 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     errors = np.array([known_to(camera) for camera in rig.cameras])
     if not errors.any():
         return Rig(rig.cameras, note=rig.note)
-    start, decided = closed_form(views, Unknowns.of(rig))
+    start = closed_form(views, rig.cameras)
     if not np.isfinite(intersect(start, views)[0]).any():
         raise ValueError(
             "rig: the lines of sight must meet in front of the perspective cameras, got none that "
@@ -105,15 +353,10 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     off = np.where(measured, np.abs(found.change) / np.where(measured, errors, 1.0), 0.0)
     if off.max() > _TOO_FAR:
         i, part = np.unravel_index(off.argmax(), off.shape)
-        what = next(name for name, place in PARTS.items() if place.start <= part < place.stop)
+        what = next(name for name, place in PARTS.items() if part in place)
         doubts += (
             f"the {what} of cameras[{i}] is {off.max():.0f} times its error from what was "
             "measured: check it, and how the others were measured",
-        )
-    if not decided:
-        doubts += (
-            "which frames hold outliers of a track cannot be told: leaving some out makes others "
-            "look wrong; check the tracks, the positions and the normals",
         )
     left = int((~intersect(found.cameras, views)[1]).sum())
     if left:
@@ -176,13 +419,11 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     """
     errors = np.array([known_to(camera) for camera in rig.cameras])
     moving = (lags.errors > 0) & np.isfinite(lags.errors)
-    errors[moving, PARTS["lag"]] = errors[lags.rate_errors > 0, PARTS["drift"]] = np.inf
+    errors[moving, LAG] = errors[lags.rate_errors > 0, DRIFT] = np.inf
     clocks = check_clocks(lags.clocks or None, tracks)
-    curves = tuple(map(Curve, tracks, clocks))
-    footage = Footage(curves, clocks[0], lags.frames, lags.rates)
+    footage = Footage.of(tracks, lags.frames, lags.rates, clocks)
     near = adjust(footage, learned.cameras, errors, most=0)
-    factor = fitted_factor(*near.weighed, near.prior, near.noise)
-    modes = np.einsum("ik,nji->knj", factor, near.path_slopes)
+    modes = np.einsum("ik,nji->knj", near.factor, near.reduced.follow)
     if not rig.note:
         return modes
     still = at_once(learned.cameras, footage.aligned)

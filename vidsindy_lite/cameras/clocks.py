@@ -24,6 +24,7 @@ INSTANTS = 300
 """At which views are compared before all frames are."""
 OVERLAP = 0.5
 """Share of the shorter of two videos that both must show."""
+_NEAR = 4.0  # frames within which a search for lags goes to the best
 _FARTHEST = 1e9  # frames by which a video may start later; and ...
 _FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
 _WIDEST = 2.5  # frames between two that a track is interpolated from: one of them may be dropped
@@ -118,13 +119,23 @@ def align(
     tracks = check_tracks(tracks)
     shifts = check_lags("lags", lags, len(tracks))
     speeds = check_rates(rates, len(tracks))
-    ticks = check_clocks(clocks, tracks)
-    return Footage(tuple(map(Curve, tracks, ticks)), ticks[0], shifts, speeds).aligned
+    return Footage.of(tracks, shifts, speeds, check_clocks(clocks, tracks)).aligned
 
 
 def list_lags(lags: Sequence[float] | Floats) -> str:
     """Lags as text, to a hundredth of a frame, e.g. ``0, 7, -12.5``."""
     return ", ".join(f"{round(lag, 2) + 0.0:g}" for lag in lags)
+
+
+def dips(lags: Floats, missed: Floats) -> list[float]:
+    """Lags at which less is missed than at their neighbours and near by, the lowest first."""
+    padded = np.pad(missed, 1, constant_values=np.inf)
+    low = (missed <= padded[:-2]) & (missed <= padded[2:]) & np.isfinite(missed)
+    kept: list[float] = []
+    for lag in lags[low][np.argsort(missed[low])]:
+        if all(abs(lag - other) >= _NEAR for other in kept):
+            kept.append(float(lag))
+    return kept
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,11 +211,28 @@ class Footage:
     rates: Floats
 
     @classmethod
-    def of(cls, tracks: Sequence[Floats]) -> Footage:
-        """Tracks that are at the same instants already."""
-        even = np.arange(len(tracks[0]), dtype=float)
-        still = np.zeros(len(tracks))
-        return cls(tuple(Curve(track, even) for track in tracks), even, still, still + 1)
+    def of(
+        cls,
+        tracks: Sequence[Floats],
+        lags: Floats | None = None,
+        rates: Floats | None = None,
+        clocks: Sequence[Floats] | None = None,
+    ) -> Footage:
+        """Of what was checked; by default the tracks are at the same instants already."""
+        ticks, still = clocks or check_clocks(None, tracks), np.zeros(len(tracks))
+        curves = tuple(map(Curve, tracks, ticks))
+        shifts, speeds = still if lags is None else lags, still + 1 if rates is None else rates
+        return cls(curves, ticks[0], shifts, speeds)
+
+    @property
+    def clocks(self) -> tuple[Floats, ...]:
+        """When each frame of each video was taken, see `align`."""
+        return tuple(curve.clock for curve in self.curves)
+
+    @property
+    def lengths(self) -> Floats:
+        """Of all videos, in frames of the first, (m,)."""
+        return np.array([clock[-1] + 1 for clock in self.clocks]) / self.rates
 
     @cached_property
     def span(self) -> float:
@@ -337,10 +365,11 @@ class Clock:
             for i, (one, track) in enumerate(zip(t, tracks, strict=True))
         ]
         usual = np.array([np.median(np.diff(times)) if len(times) > 1 else 1 for times in stated])
-        frames = [
-            _rounded((times - times[0]) / step) for times, step in zip(stated, usual, strict=True)
-        ]
-        return cls(stated[0], usual[0] / usual, frames)
+        frames = [(times - times[0]) / step for times, step in zip(stated, usual, strict=True)]
+        whole = [np.rint(one) for one in frames]  # if they are, but for rounding
+        near = [np.abs(a - b).max() < _ROUNDING for a, b in zip(frames, whole, strict=True)]
+        rounded = [a if close else b for close, a, b in zip(near, whole, frames, strict=True)]
+        return cls(stated[0], usual[0] / usual, rounded)
 
     @classmethod
     def of_videos(
@@ -376,12 +405,6 @@ class Clock:
 
 def _is_even(frames: Floats) -> bool:
     return bool((frames == np.arange(len(frames))).all())
-
-
-def _rounded(frames: Floats) -> Floats:
-    """Frame numbers, whole if they are but for rounding."""
-    whole = np.rint(frames)
-    return whole if np.abs(frames - whole).max() < _ROUNDING else frames
 
 
 def _one_each(t: ArrayLike, frames: int, each: str) -> Floats:

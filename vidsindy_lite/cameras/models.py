@@ -348,6 +348,18 @@ class Camera(ABC):
             raise ValueError("camera: scale and angle must be known, got None; see learn_cameras")
         return self.scale, self.angle
 
+    @property
+    def scaled_turn(self) -> Floats:
+        """(s cos theta, s sin theta); zero if they are unknown."""
+        if self.scale is None or self.angle is None:
+            return np.zeros(2)
+        return self.scale * np.array([np.cos(self.angle), np.sin(self.angle)])
+
+    @property
+    def somewhere(self) -> Self:
+        """The same camera with a position: its own, or any."""
+        return self if self.is_placed else self.placed(np.zeros(2))
+
     @cached_property
     def rows(self) -> Floats:
         """R^-, shape (2, 3): the plane's axes, in which R^- x are in-plane coordinates."""

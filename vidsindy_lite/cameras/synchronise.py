@@ -21,12 +21,20 @@ result says so.
 The errors of lags are those of least squares, but for residuals that depend on their neighbours,
 and for slopes that are noise: with a share p of motion in the squares of the slopes they are 1 / p
 times as large.
+
+**Mistakes** are one of a few, and what is right is known at once: tracks in another order than the
+cameras, a mirrored view, v counted upwards, a video of another frame rate than stated, dropped
+frames. `find_mistake` tries all. Two views at a time, the epipolar equation tells by how much they
+disagree at all whole lags; the mistake that mends that best is tried with all cameras. Frames were
+dropped where the best lag of two views jumps.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import permutations
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,7 +42,8 @@ from tqdm import tqdm
 
 from ..arrays import Bools, Floats
 from ..progress import bar
-from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, fitted_factor, known_to
+from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, known_to
+from .calibrate import check_learnable, closed_form, learn_cameras
 from .clocks import (
     INSTANTS,
     OVERLAP,
@@ -45,18 +54,28 @@ from .clocks import (
     check_clocks,
     check_lags,
     check_rates,
+    dips,
     list_lags,
 )
-from .eq4 import Unknowns, check_learnable, closed_form
 from .models import Camera
-from .rig import ALIKE, DISAGREEMENT, FINE, GROSS, Rig, check_seen
-from .triangulate import TRIMMED, at_once, epipolar_lines, epipolar_rows, trimmed
-from .triangulate import missed as missed_by
+from .rig import (
+    ALIKE,
+    DISAGREEMENT,
+    FINE,
+    GROSS,
+    TRIMMED,
+    Rig,
+    at_once,
+    check_seen,
+    epipolar_lines,
+    epipolar_rows,
+    trimmed,
+)
+from .rig import missed as missed_by
 from .unmeasured import posed
 
 _BLOCK = 200_000  # pairs of a lag and an instant at a time
 _PROMISING = 4  # lags of each camera, with and without a shift
-_NEAR = 4.0  # frames
 _BETTER_PART = 0.7  # of all frames or equations, in which there is no outlier
 _APART = 1.0  # frames; lags closer than that are one and the same
 _PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
@@ -72,64 +91,62 @@ _ROUGH_STEPS = 8  # of the second step
 _SHOWN = 3  # of the lags that fit equally well
 _LOOSE = 0.05  # of tilts, log scales and angles that a hand measured: three degrees, 5 %
 _BETTER = 1.25  # times smaller residuals are a reason to doubt what was measured
+RATES = ((25, 30), (30, 25), (24, 30), (30, 24), (24, 25), (25, 24), (30, 60), (60, 30))
+"""Rates over those stated that are taken for each other."""
+_MENDED = 3.0  # times by which a mistake has to mend the disagreement of all views together
+_INSTANTS = 60  # at which two views are compared
+_MISTAKES = 16  # of a kind that mend most, tried with all cameras
+_PART = 0.4  # of the videos, in which their cameras are learned if frames were dropped elsewhere
+_FRAMES = 1500  # of the first video at which a jump of the lag is sought
+_LONGEST = 60  # frames by which it may jump
+_MOST, _PRICE = 8.0, 40.0  # typical misses: the most that one frame counts, and the price of a jump
+_MANY = 6  # cameras, of which only two are taken for each other
+_ROUNDING = 1e-9  # pixels
 
 
-def promising_lags(curves: Sequence[Curve], rates: Floats, unknowns: Unknowns) -> list[list[float]]:
+def promising_lags(footage: Footage, cameras: Sequence[Camera]) -> list[list[float]]:
     """Whole lags of each camera behind the first calibrated one, the most promising first."""
-    known = unknowns.known
+    both = (lag_misses(footage, cameras, shift=shift) for shift in (False, True))
     found = []
-    for lags, missed in lag_misses(curves, rates, unknowns):
-        choices = [_dips(lags, part)[:_PROMISING] for part in missed]
-        found.append(_apart(np.concatenate(choices)).tolist() or [0.0])
-    return [*found[:known], [0.0], *found[known:]]
+    for without, shifted in zip(*both, strict=True):
+        choices = [lag for misses in (without, shifted) for lag in dips(*misses)[:_PROMISING]]
+        found.append([*dict.fromkeys(choices)] or [0.0])
+    found.insert(first_known(cameras), [0.0])
+    return found
 
 
 def lag_misses(
-    curves: Sequence[Curve],
-    rates: Floats,
-    unknowns: Unknowns,
+    footage: Footage,
+    cameras: Sequence[Camera],
     most: int = INSTANTS,
-    shifts: Sequence[bool] = (False, True),
+    shift: bool = False,
 ) -> Iterator[tuple[Floats, Floats]]:
     """Of each camera but the first calibrated one, all whole lags (k,) and `pair_missed` at these.
 
-    The misses are those without and with a shift, at so many instants at most.
+    The misses are at so many instants at most.
     """
-    known = unknowns.known
+    known, curves, ends = first_known(cameras), footage.curves, footage.lengths
     frames = curves[known].clock
     frames = frames[:: max(1, len(frames) // most)]
-    ends = np.array([curve.clock[-1] + 1 for curve in curves]) / rates  # on the first one's clock
     for other in range(len(curves)):
         if other == known:
             continue
         margin = OVERLAP * min(ends[known], ends[other])
         lags = np.arange(np.ceil(margin - ends[other]), ends[known] - margin + 1)
-        first, second = unknowns.cameras[known], unknowns.cameras[other]
+        first, second = cameras[known], cameras[other]
         placed = first.is_placed and second.is_placed
-        near, far = (c if c.is_placed else c.placed(np.zeros(2)) for c in (first, second))
-        lines = epipolar_lines(near, curves[known].at(frames), far)
-        instants, rate = frames / rates[known], rates[other]
+        lines = epipolar_lines(first.somewhere, curves[known].at(frames), second.somewhere)
+        instants, rate = frames / footage.rates[known], footage.rates[other]
         missed = []
         for block in np.array_split(lags, int(np.ceil(lags.size * frames.size / _BLOCK))):
             theirs = curves[other].at((instants - block[:, None]) * rate)
-            missed.append([pair_missed(second, placed, lines, theirs, shift) for shift in shifts])
-        yield lags, np.concatenate(missed, axis=1)
+            missed.append(pair_missed(second, placed, lines, theirs, shift))
+        yield lags, np.concatenate(missed)
 
 
-def _dips(lags: Floats, missed: Floats) -> Floats:
-    """The lags of the minima, the lowest first."""
-    padded = np.concatenate(([np.inf], missed, [np.inf]))
-    dips = np.flatnonzero((missed <= padded[:-2]) & (missed <= padded[2:]) & np.isfinite(missed))
-    return _apart(lags[dips[np.argsort(missed[dips])]])
-
-
-def _apart(lags: Floats) -> Floats:
-    """Those that no earlier one is close to: a search goes to the best within a few frames."""
-    kept: list[float] = []
-    for lag in lags:
-        if all(abs(lag - other) >= _NEAR for other in kept):
-            kept.append(lag)
-    return np.array(kept)
+def first_known(cameras: Sequence[Camera]) -> int:
+    """The first calibrated camera."""
+    return next(i for i, camera in enumerate(cameras) if camera.is_calibrated)
 
 
 def pair_missed(
@@ -141,12 +158,8 @@ def pair_missed(
     instant in ten is left out. Infinite where too few are left.
     """
     design, target = epipolar_rows(lines, other, theirs)
-    if other.is_calibrated:
-        scale, angle = other.calibration
-        design, target = (
-            design[..., :0],
-            target - design @ [scale * np.cos(angle), scale * np.sin(angle)],
-        )
+    target = target - design @ other.scaled_turn
+    design = design[..., : 0 if other.is_calibrated else 2]
     extra = lines[0] if shift else np.ones((len(lines[0]), 1)) if not placed else lines[0][:, :0]
     extra = np.broadcast_to(extra, (*target.shape, extra.shape[1]))
     design = np.concatenate((design, extra), axis=-1)
@@ -172,26 +185,15 @@ def pair_missed(
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """What was fitted, and to what."""
+    """What was fitted, and what that tells of the lags."""
 
-    footage: Footage
-    cameras: tuple[Camera, ...]
     fit: Adjustment
 
     @classmethod
-    def of(
-        cls,
-        footage: Footage,
-        cameras: tuple[Camera, ...],
-        errors: Floats,
-        *,
-        begin: Floats | None = None,
-        most: int = STEPS,
-    ) -> Timing | None:
+    def of(cls, fit: Adjustment) -> Timing | None:
         """None if the views have too little in common."""
-        fit = adjust(footage, cameras, errors, begin=begin, most=most)
         told = np.isfinite(fit.misses).any(axis=1).sum()
-        return cls(footage, cameras, fit) if 3 * told > np.isinf(errors[:, _TIMES]).sum() else None
+        return cls(fit) if 3 * told > np.isinf(fit.errors[:, _TIMES]).sum() else None
 
     @property
     def lags(self) -> Floats:
@@ -204,19 +206,9 @@ class Timing:
         return self.fit.weights > _USED
 
     @property
-    def missed(self) -> Floats:
-        """Residuals, (m, n, 2)."""
-        return np.stack(np.split(self.fit.misses, len(self.cameras), axis=1))
-
-    @property
-    def residual(self) -> float:
-        """The worst camera's, pixels."""
-        return max(map(trimmed, self.missed))
-
-    @property
     def score(self) -> float:
-        """The same, if errors are normal but for some outliers: from the better part of them."""
-        return max(trimmed(part, _BETTER_PART) for part in self.missed)
+        """What is left, if errors are normal but for some outliers: by the better part of them."""
+        return self.fit.left(_BETTER_PART)
 
     @property
     def agrees(self) -> bool:
@@ -244,12 +236,12 @@ class Timing:
         between two frames that are two apart.
         """
         fit, used = self.fit, self.used
-        slopes = fit.slopes[used].reshape(-1, fit.slopes.shape[-1])
-        parts = np.argwhere(fit.errors > 0)[:, 1]
+        slopes = fit.reduced.slopes[used].reshape(-1, len(fit.prior))
+        parts = np.argwhere(fit.free)[:, 1]
         lags, others = slopes[:, parts == LAG], slopes[:, ~np.isin(parts, _TIMES)]
         lags = lags - others @ np.linalg.lstsq(others, lags)[0] if others.size else lags
         # Of the two numbers of each of k views, the point leaves 2 - 3 / k.
-        seen = np.isfinite(self.missed[:, used, 0])
+        seen = np.isfinite(self.fit.misses[used, ::2].T)
         views = np.maximum(seen.sum(axis=0), 2)
         freedom = np.maximum((seen * (2 - 3 / views)).sum(axis=1)[1:], 1e-9)
         speeds = fit.footage.rates[1:]
@@ -260,10 +252,8 @@ class Timing:
     @property
     def covariance(self) -> Floats:
         """Of lags and drifts, if that of cameras is known as well as the tracks tell it."""
-        fit = self.fit
-        factor = fitted_factor(*fit.weighed, fit.prior, fit.noise)
-        covariance = factor @ factor.T
-        cameras, parts = np.argwhere(fit.errors > 0).T
+        covariance = self.fit.factor @ self.fit.factor.T
+        cameras, parts = np.argwhere(self.fit.free).T
         order = np.concatenate([np.flatnonzero(parts == part) for part in _TIMES])
         # Slopes that are noise add to the information, but mend nothing.
         share = np.append(1.0, np.maximum(self.shares, _LEAST))[cameras[order]]
@@ -271,9 +261,9 @@ class Timing:
 
     def drifted(self) -> Timing:
         """The same with drifts of clocks, if any are clear and large enough to matter."""
-        errors, change = self.fit.errors.copy(), self.fit.change
+        fit, errors = self.fit, self.fit.errors.copy()
         errors[1:, DRIFT] = np.inf
-        free = Timing.of(self.footage, self.cameras, errors, begin=change)
+        free = Timing.of(adjust(fit.given, fit.start, errors, begin=fit.change))
         if free is None:
             return self
         drift, off = free.fit.change[:, DRIFT], np.zeros(len(errors))
@@ -283,7 +273,7 @@ class Timing:
             return self
         errors[~clear, DRIFT] = 0.0
         begin = np.where(errors > 0, free.fit.change, 0.0)
-        return Timing.of(self.footage, self.cameras, errors, begin=begin) or self
+        return Timing.of(adjust(fit.given, fit.start, errors, begin=begin)) or self
 
 
 def learn_lags(
@@ -335,30 +325,16 @@ def learn_lags(
     with bar(progress, "synchronise", unit="fit") as shown:
         videos = _Videos.of(tracks, rig, given, clocks, shown)
         found = _learned(videos, first)
-    return found if clocks is None else replace(found, clocks=tuple(c.clock for c in videos.curves))
-
-
-def nearest(
-    tracks: Sequence[Floats],
-    rig: Rig,
-    rates: Floats,
-    lags: Floats,
-    clocks: Sequence[ArrayLike] | None,
-) -> float:
-    """Residual in pixels at the best lags near given ones."""
-    with tqdm(disable=True) as bar:
-        found = _Videos.of(tracks, rig, rates, clocks, bar).fitted(lags, rough=True)
-    return np.inf if found is None else found.residual
+    return found if clocks is None else replace(found, clocks=videos.given.clocks)
 
 
 @dataclass(frozen=True, eq=False)
 class _Videos:
-    """The tracks as functions of time, what is known of the cameras, and a bar to move."""
+    """The tracks as functions of time, what is known of the cameras, and a bar to move, if any."""
 
-    curves: tuple[Curve, ...]
-    unknowns: Unknowns
-    rates: Floats
-    bar: tqdm
+    given: Footage
+    known: tuple[Camera, ...]
+    shown: tqdm | None = None
 
     @classmethod
     def of(
@@ -367,17 +343,17 @@ class _Videos:
         rig: Rig,
         rates: Floats,
         clocks: Sequence[ArrayLike] | None,
-        bar: tqdm,
+        shown: tqdm | None = None,
     ) -> _Videos:
         """Of tracks as they are given."""
         still = at_once(rig.cameras, tracks)
-        instant = Rig(tuple(replace(camera, readout=0.0) for camera in rig.cameras))
-        curves = tuple(map(Curve, still, check_clocks(clocks, tracks)))
-        return cls(curves, Unknowns.of(instant), rates, bar)
+        instant = tuple(replace(camera, readout=0.0) for camera in rig.cameras)
+        footage = Footage.of(still, None, rates, check_clocks(clocks, tracks))
+        return cls(footage, instant, shown)
 
     def footage(self, lags: Floats, rough: bool = False) -> Footage:
         """All instants, or some."""
-        every = Footage(self.curves, self.curves[0].clock, lags, self.rates)
+        every = replace(self.given, lags=lags)
         return every.some if rough else every
 
     def cameras(self, footage: Footage) -> tuple[Camera, ...] | None:
@@ -386,15 +362,15 @@ class _Videos:
         if not all(np.isfinite(track).any() for track in tracks):
             return None
         try:
-            return closed_form(tracks, self.unknowns, checked=False)[0]
+            return closed_form(tracks, self.known, checked=False)
         except ValueError:
             return None
 
     def errors(self, rough: bool = False, loose: bool = False) -> Floats:
         """What is known of cameras, and of all lags but the first one's nothing."""
-        errors = np.array([known_to(camera) for camera in self.unknowns.cameras])
+        errors = np.array([known_to(camera) for camera in self.known])
         if (
-            rough and len(self.curves[0].clock) > INSTANTS
+            rough and len(self.given.instants) > INSTANTS
         ):  # which are too few to tell where the target was between two
             errors[:, PARTS["readout"]] = 0.0
         errors[1:, LAG] = np.inf
@@ -407,13 +383,14 @@ class _Videos:
 
     def fitted(self, lags: Floats, rough: bool = False, loose: bool = False) -> Timing | None:
         """The best lags near given ones, or better ones than these; None if nothing fits."""
-        self.bar.update()
+        if self.shown is not None:
+            self.shown.update()
         footage = self.footage(lags, rough)
         cameras = self.cameras(footage)
         if cameras is None:
             return None
-        errors = self.errors(rough, loose)
-        return Timing.of(footage, cameras, errors, most=_ROUGH_STEPS if rough else STEPS)
+        most = _ROUGH_STEPS if rough else STEPS
+        return Timing.of(adjust(footage, cameras, self.errors(rough, loose), most=most))
 
 
 # ------------------------------------------------------------------------------------- the search
@@ -454,7 +431,7 @@ def _learned(videos: _Videos, first: Floats) -> Lags:
 
 def _searched(videos: _Videos, first: Floats) -> tuple[bool, list[Timing]]:
     """Whether cameras should be loose, and fits to some of the instants, the best first."""
-    promising = promising_lags(videos.curves, videos.rates, videos.unknowns)
+    promising = promising_lags(videos.given, videos.known)
     exact = _climbed(videos, promising, first, False)
     if not exact or exact[0].score <= FINE:
         return False, exact
@@ -484,7 +461,7 @@ def _climbed(
         if key not in tried:
             tried[key] = videos.fitted(np.array(key), True, loose)
         found = tried[key]
-        return np.inf if found is None else found.residual
+        return np.inf if found is None else found.fit.left()
 
     best = np.array([lags[0] for lags in promising])
     fits(first)
@@ -538,7 +515,7 @@ def _told(videos: _Videos, found: Timing, first: Floats) -> Lags:
             "the lags if you know them"
         )
     return Lags(
-        lags, fit.footage.rates, errors, found.residual, tuple(warnings), rate_errors=rate_errors
+        lags, fit.footage.rates, errors, found.fit.left(), tuple(warnings), rate_errors=rate_errors
     )
 
 
@@ -557,7 +534,7 @@ def _untold(videos: _Videos, lags: Floats, agree: bool) -> Lags:
             f"no lags of the videos make the views agree: ({list_lags(lags)}) frames were taken, "
             f"which {left}; check the rig, or give the lags if you know them"
         ]
-    return Lags(lags, videos.rates, errors, residual, tuple(warnings))
+    return Lags(lags, videos.given.rates, errors, residual, tuple(warnings))
 
 
 def _blurred(i: int, lags: Floats) -> str:
@@ -566,3 +543,204 @@ def _blurred(i: int, lags: Floats) -> str:
         f"the lag of video {i + 1} cannot be told, because the target moves too little or too "
         f"slowly: {lags[i]:g} frames were taken; give the lags if you know them"
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Mistake:
+    """What may have been done to the tracks, and what they are without it."""
+
+    what: str
+    tracks: tuple[Floats, ...]
+    rates: Floats
+    clocks: tuple[Floats, ...]
+    lags: Lags = Lags(np.zeros(0), np.zeros(0), np.zeros(0), np.inf)
+    before: float = np.inf
+
+    @property
+    def text(self) -> str:
+        """What explains that the views did not agree."""
+        return (
+            f"the rig does not agree with the tracks as they are given: {self.what} explains it "
+            f"({self.lags.residual:.2g} pixels apart instead of {self.before:.3g}), and was put "
+            "right here: do so in what is given"
+        )
+
+    def paired(self, cameras: Sequence[Camera]) -> tuple[float, Floats]:
+        """By how much two views disagree at their best lags, all pairs; and these lags."""
+        footage = Footage.of(self.tracks, None, self.rates, self.clocks)
+        least, lags = [], []
+        for tried, missed in lag_misses(footage, cameras, _INSTANTS):
+            least.append(missed.min())
+            lags.append(tried[missed.argmin()])
+        behind = np.insert(lags, first_known(cameras), 0.0)
+        return float(np.linalg.norm(least)), behind - behind[0]
+
+    def left(self, rig: Rig, lags: Floats) -> float:
+        """Pixels by which the worst view disagrees near these lags."""
+        videos = _Videos.of(self.tracks, rig, self.rates, self.clocks)
+        found = videos.fitted(lags, rough=True)
+        return np.inf if found is None else found.fit.left()
+
+
+def find_mistake(
+    tracks: Sequence[Floats],
+    rig: Rig,
+    rates: Floats,
+    clocks: Sequence[Floats] | None,
+    start: Floats,
+    names: Sequence[str],
+) -> Mistake | None:
+    """The one mistake without which the views agree; None if they do anyway, or with none.
+
+    Parameters
+    ----------
+    tracks, rig, rates, clocks, start
+        See `learn_lags`.
+    names : sequence of str
+        What the videos are called.
+    """
+    none = Mistake("", tuple(tracks), rates, check_clocks(clocks, tracks))
+    with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
+        return _found(none, rig, start, names)
+    return None
+
+
+def _found(none: Mistake, rig: Rig, start: Floats, names: Sequence[str]) -> Mistake | None:
+    """The same, where the tracks can be compared."""
+    if none.left(rig, start) <= 2 * DISAGREEMENT:
+        return None
+    _, lags = none.paired(rig.cameras)
+    left = none.left(rig, lags)
+    if left <= 2 * DISAGREEMENT:
+        return None
+    for kind in (_views, _rates, _dropped):
+        # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse none.
+        ranked = [(*one.paired(rig.cameras), one) for one in kind(none, rig, names)]
+        ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
+        tried = [(one.left(rig, best), best, one) for _, best, one in ranked]
+        for now, best, one in sorted(tried, key=lambda one: one[0]):
+            if _MENDED * now < left:
+                told = learn_lags(one.tracks, rig, one.rates, best, one.clocks)
+                if told.residual <= DISAGREEMENT:
+                    return replace(one, lags=told, before=left)
+    return None
+
+
+def _views(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
+    """All that change whole views: their order, and their axes."""
+    count, sizes = len(names), [camera.image_size for camera in rig.cameras]
+    for moved, order in _orders(count):
+        if len({sizes[i] for i in moved}) == 1:
+            tracks, clocks = (tuple(one[i] for i in order) for one in (none.tracks, none.clocks))
+            rates = none.rates[order] / none.rates[order[0]]
+            how = "swapped" if len(moved) == 2 else "in another order than their cameras"
+            what = f"{' and '.join(names[i] for i in moved)} {how}"
+            yield Mistake(what, tracks, rates, clocks)
+    known = {i for i, camera in enumerate(rig.cameras) if camera.is_calibrated}
+    for axis, what in ((0, "mirrored"), (1, "with v counted upwards")):
+        for views in [*([i] for i in range(count)), [*range(count)]]:
+            told, how = names[views[0]] if len(views) == 1 else "all views", what
+            if len(views) == 1 and not known & {*views}:
+                # Half a turn from a mirrored view is one with v counted upwards.
+                how = "mirrored, or with v counted upwards"
+            elif len(views) == 1 and known <= {*views}:
+                how = "mirrored, or with v counted upwards: then the path has the other sign"
+            if axis == 1 and how != what:
+                continue
+            given = list(none.tracks)
+            for i in views:
+                turned = [given[i][:, 0], given[i][:, 1]]
+                turned[axis] = sizes[i][axis] - 1 - turned[axis]
+                given[i] = np.column_stack(turned)
+            yield replace(none, what=f"{told} {how}", tracks=tuple(given))
+
+
+def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
+    """Orders in which two views change places, or three in a ring; and which these are."""
+    for size in (2, 3) if count < _MANY else (2,):
+        for ring in permutations(range(count), size):
+            if ring[0] == min(ring):  # the others are the same ones
+                order = [*range(count)]
+                for i, j in zip(ring, (*ring[1:], ring[0]), strict=True):
+                    order[i] = j
+                yield tuple(sorted(ring)), order
+
+
+def _rates(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
+    """Frame rates that are taken for each other."""
+    count = len(names)
+    for i in range(count):
+        for real, stated in RATES:
+            rates = np.where(np.arange(count) == i, real / stated, 1.0) * none.rates
+            what = f"{names[i]} with {real} frames for {stated} that are supposed"
+            yield replace(none, what=what, rates=rates / rates[0])
+
+
+def _dropped(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
+    """Videos of which frames were dropped, each with the clock by which it agrees all the time."""
+    shares = ((0.0, _PART), (1 - _PART, 1.0))  # of a video, in one of which none is dropped, maybe
+    for low, high in shares:
+        rows = [slice(int(low * len(t)), int(high * len(t))) for t in none.tracks]
+        tracks = tuple(t[part] for t, part in zip(none.tracks, rows, strict=True))
+        clocks = tuple(c[part] for c, part in zip(none.clocks, rows, strict=True))
+        part = replace(none, tracks=tracks, clocks=clocks)
+        _, lags = part.paired(rig.cameras)
+        try:
+            learned = learn_cameras(align(tracks, lags, none.rates, clocks), rig)
+        except ValueError:
+            continue
+        curves = tuple(map(Curve, none.tracks, none.clocks))
+        jumps = [_jumps(curves, none.rates, learned.cameras, lags, j) for j in range(1, len(names))]
+        if all(found and found[0][1] < 0 for found in jumps):  # it is the first that lacks some
+            each = {0: [(frame, -lag) for frame, lag in jumps[0]]}
+        else:
+            each = {j: found for j, found in enumerate(jumps, start=1) if found}
+        mended, told = list(none.clocks), []
+        for j, found in each.items():
+            clock = mended[j].copy()
+            lag = 0.0 if j == 0 else lags[j] - (low > 0) * sum(jump for _, jump in found)
+            for frame, jump in found:
+                row = int(np.clip(np.rint((frame - lag) * none.rates[j]), 0, len(clock) - 1))
+                count, lag = round(jump * none.rates[j]), lag + jump
+                clock[row:] += count
+                told.append(f"{count} frames dropped of {names[j]} before its frame {row}")
+            mended[j] = clock
+        if told and all((np.diff(clock) > 0).all() for clock in mended):
+            yield replace(none, what=", ".join(told), clocks=tuple(mended))
+
+
+def _jumps(
+    curves: Sequence[Curve], rates: Floats, cameras: Sequence[Camera], lags: Floats, j: int
+) -> list[tuple[float, float]]:
+    """Where the lag of a video behind the first jumps for good, and by how much.
+
+    The lags that leave the least, each jump at a price, by dynamic programming.
+    """
+    frames = curves[0].clock[:: -(-len(curves[0].clock) // _FRAMES)]
+    tried = lags[j] - lags[0] + np.arange(-_LONGEST, _LONGEST + 1)
+    lines = epipolar_lines(cameras[0], curves[0].at(frames), cameras[j])
+    theirs = curves[j].at((frames - tried[:, None]) * rates[j])
+    design, target = epipolar_rows(lines, cameras[j], theirs)
+    missed = np.abs(target - design @ cameras[j].scaled_turn)
+    usual = missed[_LONGEST][np.isfinite(missed[_LONGEST])]
+    if not usual.size:
+        return []
+    typical = max(float(np.quantile(usual, _PART / 2)), _ROUNDING)
+    # What nobody saw costs as much as what was seen: no lag is better for leaving frames out.
+    cost = np.minimum(missed / typical, _MOST)
+    cost = np.nan_to_num(cost, nan=float(np.minimum(usual / typical, _MOST).mean()))
+    total, before = cost[:, 0], []
+    for now in cost[:, 1:].T:
+        best = int(total.argmin())
+        jumped = total > total[best] + _PRICE
+        before.append(np.where(jumped, best, np.arange(len(total))))
+        total = np.where(jumped, total[best] + _PRICE, total) + now
+    path = [int(total.argmin())]
+    for step in before[::-1]:
+        path.append(int(step[path[-1]]))
+    path = path[::-1]
+    return [
+        (float(frames[k]), float(path[k] - path[k - 1]))
+        for k in range(1, len(path))
+        if path[k] != path[k - 1]
+    ]

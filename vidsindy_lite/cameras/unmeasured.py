@@ -39,10 +39,9 @@ from scipy.optimize import least_squares
 
 from ..arrays import Floats
 from .adjust import PARTS, Adjustment, adjust, known_to
-from .clocks import OVERLAP, Curve, Footage, Lags, check_clocks
+from .clocks import OVERLAP, Footage, Lags, check_clocks, dips
 from .models import AffineCamera, PerspectiveCamera
-from .rig import ALIKE, FINE, GROSS, Rig, check_views
-from .triangulate import at_once, missed
+from .rig import ALIKE, FINE, GROSS, Rig, at_once, check_views, missed
 
 _FEWEST = 8  # frames in common of a pair
 _UNKNOWN = 45.0  # degrees
@@ -323,8 +322,7 @@ def factorised(
     rates, clocks, lags
         See `align`; lags are found if they are not given.
     """
-    ticks = check_clocks(clocks, tracks)
-    films = Footage(tuple(map(Curve, tracks, ticks)), ticks[0], np.zeros(len(tracks)), rates)
+    films = Footage.of(tracks, None, rates, check_clocks(clocks, tracks))
     views = _Views(films.some)
     ranks = range(1, 4)
     found = [
@@ -358,7 +356,7 @@ def factorised(
     doubts = () if left <= GROSS else (
         f"views agree on one motion but for {left:.2g} pixels of noise: look at the tracks",
     )  # fmt: skip
-    told = Lags(best, rates, errors, left, doubts, clocks=() if clocks is None else ticks)
+    told = Lags(best, rates, errors, left, doubts, clocks=films.clocks if clocks else ())
     return Factorised(Rig(tuple(cameras), note=_NOTE), told, rank)
 
 
@@ -368,31 +366,19 @@ class _Views:
 
     footage: Footage
 
-    def matrix(self, lags: Floats, places: Sequence[int]) -> Floats:
-        """Tracks of some views side by side, (n, 2 m)."""
-        late = replace(self.footage, lags=lags)
-        return np.hstack([late.curves[i].at(late.frames(i)) for i in places])
-
-    @cached_property
-    def lengths(self) -> Floats:
-        """Of all videos, in frames of the first."""
-        frames = [np.ptp(curve.clock) + 1 for curve in self.footage.curves]
-        return np.array(frames) / self.footage.rates
-
     @cached_property
     def least(self) -> float:
         """Frames of the first video that all must show."""
-        return OVERLAP * float(self.lengths.min())
+        return OVERLAP * float(self.footage.lengths.min())
 
     def left(self, lags: Floats, places: Sequence[int], rank: int) -> float:
         """Noise of the pixels that is left beyond a rank; infinite of too few common frames."""
-        matrix = self.matrix(lags, places)
-        seen = matrix[np.isfinite(matrix).all(axis=1)]
+        beyond = self.beyond(lags, places, rank)
+        count, width = np.isfinite(beyond[:, 0]).sum(), beyond.shape[1]
         step = self.footage.span / max(len(self.footage.instants) - 1, 1)
-        if len(seen) <= matrix.shape[1] or len(seen) * step < self.least:
+        if count <= width or count * step < self.least:
             return np.inf
-        values = np.linalg.eigvalsh(np.cov(seen.T, bias=True))
-        return float(np.sqrt(max(values[:-rank].mean(), 0.0)))
+        return float(np.sqrt(np.nansum(beyond**2) / (count * (width - rank))))
 
     def best(self, rank: int) -> tuple[float, Floats]:
         """What the lags leave beyond a rank that leave least, and those lags.
@@ -401,9 +387,9 @@ class _Views:
         tried together, and further views one by one. Of those that leave about as little, the
         shortest count.
         """
-        count = len(self.lengths)
+        count = len(self.footage.curves)
         lags = np.zeros(count)
-        promising = [self._promising(i, rank) for i in range(1, count)]
+        promising = [self._promising(i, rank)[:_PROMISING] or [0.0] for i in range(1, count)]
         for last in range(3, count + 1):
             tried = []
             for new in product(*promising[:2]) if last == 3 else product(promising[last - 2]):
@@ -419,42 +405,45 @@ class _Views:
 
     def _promising(self, i: int, rank: int) -> list[float]:
         """Whole lags of a view at which less is left than at their neighbours, the best first."""
-        first, last = self.least - self.lengths[i], self.lengths[0] - self.least
-        tried = np.arange(np.ceil(first), last + 1)
-        lags = np.zeros(len(self.lengths))
-        left = np.full(len(tried) + 2, np.inf)
-        for k, lags[i] in enumerate(tried):
-            left[k + 1] = self.left(lags, (0, i), rank)
-        lowest = np.flatnonzero((left[1:-1] <= left[:-2]) & (left[1:-1] <= left[2:]))
-        return tried[lowest[np.argsort(left[1 + lowest])][:_PROMISING]].tolist()
+        lengths = self.footage.lengths
+        tried = np.arange(np.ceil(self.least - lengths[i]), lengths[0] - self.least + 1)
+        every = np.zeros((len(tried), len(lengths)))
+        every[:, i] = tried
+        return dips(tried, np.array([self.left(lags, (0, i), rank) for lags in every]))
 
     def _polished(self, lags: Floats, count: int, rank: int) -> Floats:
         """The lags of so many views, to fractions of a frame, that leave least near by."""
 
         def beyond(others: Floats) -> Floats:
-            return self._beyond(np.concatenate(([0.0], others, lags[count:])), range(count), rank)
+            late = np.concatenate(([0.0], others, lags[count:]))
+            return np.nan_to_num(self.beyond(late, range(count), rank)).ravel()
 
         found = least_squares(beyond, lags[1:count], diff_step=1e-3, max_nfev=_STEPS)
         return np.concatenate(([0.0], found.x, lags[count:]))
 
-    def _beyond(self, lags: Floats, places: Sequence[int], rank: int) -> Floats:
-        """What is left of every frame beyond a rank, pixels; zero where a view is missing."""
-        matrix = self.matrix(lags, places)
+    def beyond(self, lags: Floats, places: Sequence[int], rank: int) -> Floats:
+        """Tracks of some views side by side, (n, 2 m), without their mean and so many directions.
+
+        NaN where a view is missing.
+        """
+        late = replace(self.footage, lags=lags)
+        matrix = np.hstack([late.curves[i].at(late.frames(i)) for i in places])
         seen = np.isfinite(matrix).all(axis=1)
-        beyond = np.zeros_like(matrix)
+        matrix[~seen] = np.nan
         if seen.any():
             centred = matrix[seen] - matrix[seen].mean(axis=0)
             axes = np.linalg.svd(centred, full_matrices=False)[2][:rank]
-            beyond[seen] = centred - centred @ axes.T @ axes
-        return beyond.ravel()
+            matrix[seen] = centred - centred @ axes.T @ axes
+        return matrix
 
     def errors(self, lags: Floats, rank: int) -> Floats:
         """Standard errors of the lags, if what is left is independent noise, (m,)."""
         every, step = range(len(lags)), 1e-2
-        here = self._beyond(lags, every, rank)
+        here = np.nan_to_num(self.beyond(lags, every, rank))
         moves = step * np.eye(len(lags))[1:]
-        ends = [[self._beyond(lags + s * move, every, rank) for s in (1, -1)] for move in moves]
-        slopes = np.array([(later - sooner) / (2 * step) for later, sooner in ends])
+        ends = [[self.beyond(lags + s * move, every, rank) for s in (1, -1)] for move in moves]
+        slopes = np.array([(later - sooner).ravel() / (2 * step) for later, sooner in ends])
+        slopes = np.nan_to_num(slopes)
         information = slopes @ slopes.T
         if np.linalg.cond(information) > 1 / np.finfo(float).eps:
             return np.append(0.0, np.full(len(slopes), np.inf))
