@@ -12,8 +12,8 @@ from vidsindy_lite.vision.background import (
     _others,
     _shape,
     _unrest,
-    camera_motion,
     changes,
+    displacement,
     dot,
     hull,
     lengths,
@@ -51,10 +51,10 @@ def test_a_displaced_view_is_measured(texture, shift):
     rng = np.random.default_rng(1)
     change = -(shift[0] * slope[0] + shift[1] * slope[1])
     changes = [(change + rng.normal(0, 0.1, change.shape)).astype(np.float32)] * 3
-    found = camera_motion(texture, changes, 1e3)
+    found = displacement(texture, changes, 1e3)
     np.testing.assert_allclose(found, 4 * np.hypot(*shift), rtol=0.05)  # in pixels of the video
     still = [rng.normal(0, 1, texture.shape).astype(np.float32) for _ in range(5)]
-    np.testing.assert_array_equal(camera_motion(texture, still, 1e3), 0)
+    np.testing.assert_array_equal(displacement(texture, still, 1e3), 0)
 
 
 def test_a_displaced_view_is_measured_beside_what_differs_from_it(texture):
@@ -62,7 +62,7 @@ def test_a_displaced_view_is_measured_beside_what_differs_from_it(texture):
     change = (-0.12 * slope[0] + 0.16 * slope[1]).astype(np.float32)
     change[10:20, 30:45] += 500  # the target, before a texture whose changes are below 100
     assert np.delete(np.abs(change), np.s_[10:20], axis=0).max() < 50
-    np.testing.assert_allclose(camera_motion(texture, [change], 100.0), 4 * 0.2, rtol=0.05)
+    np.testing.assert_allclose(displacement(texture, [change], 100.0), 4 * 0.2, rtol=0.05)
 
 
 def test_where_there_is_little_to_see_a_view_is_hardly_displaced_by_more_than_a_pixel():
@@ -72,9 +72,9 @@ def test_where_there_is_little_to_see_a_view_is_hardly_displaced_by_more_than_a_
     ground = (100 + steep * np.stack([u, v, 0 * u], axis=2)).astype(np.float32)
     change = np.zeros_like(ground)
     change[..., 0] = -2 * steep
-    found = camera_motion(ground.astype(np.float64), [change], 8.0)
+    found = displacement(ground.astype(np.float64), [change], 8.0)
     np.testing.assert_allclose(found, 4 * 2 * 30 / 31, rtol=0.02)
-    np.testing.assert_array_equal(camera_motion(ground, [change / 2], 8.0), 0)  # it may be noise
+    np.testing.assert_array_equal(displacement(ground, [change / 2], 8.0), 0)  # it may be noise
 
 
 def test_what_differs_far_from_the_target_is_told():
@@ -98,7 +98,7 @@ def test_one_push_or_one_change_of_light_is_unrest(texture):
     changes = [rng.normal(0, 0.1, ground.shape).astype(np.float32) for _ in range(21)]
 
     def unrest(changes):
-        return _unrest(ground, changes, camera_motion(ground, changes, 8.0), 8.0)
+        return _unrest(ground, changes, displacement(ground, changes, 8.0), 8.0)
 
     assert unrest(changes) == ()
     pushed = [*changes[:20], changes[20] - (0.2 * slope[0]).astype(np.float32)]

@@ -38,7 +38,6 @@ from .plate import Plate, least_difference, tolerance
 from .steadying import carry
 from .video import Reel
 
-_LEVELS = 1.0, 2.5, 6.0  # tolerances by which what is connected differs
 _APART = 3  # frames to the neighbours with which a frame is compared
 _KEPT = 16  # candidates of a frame
 GAP = 15  # frames that a path may miss
@@ -96,32 +95,22 @@ def candidates(
     """The candidates of all frames, and how much brighter each frame is than the ground."""
     lights, found = [], []
     bound = tolerance(plate.image, least_difference(noise), moves=plate.moves)
-    if plate.moves:
-        bound[plate.valid == 0] = 1e3
+    bound[plate.valid == 0] = 1e3
     for i, (frame, here, others) in enumerate(_with_neighbours(frames, maps)):
-        height, width = frame.shape[:2]
         ground, known = plate.seen_from(here)
-        allowed = bound
-        if plate.moves:
-            back = np.linalg.inv(plate.shift @ here)
-            there = cv2.warpPerspective(bound, back, (width, height), borderValue=1e3)
-            allowed = np.asarray(there, np.float32)
+        allowed = plate.laid(bound, here)
         lit = light(frame, ground, known)
         lights.append(lit)
         differs = lengths(changes(frame, ground, lit))
         if plate.unsure is not None:  # a guess says nothing of what is within its error
-            unsure = plate.unsure
-            if plate.moves:
-                there = cv2.warpPerspective(unsure, back, (width, height))
-                unsure = np.asarray(there, np.float32)
-            differs = np.maximum(differs - unsure, 0)
-        strengths = [differs / allowed * known]
+            differs = np.maximum(differs - plate.laid(plate.unsure, here), 0)
+        witnesses = [(differs / allowed * known, 1.0)]
         if others:
-            strengths.append(_from_neighbours(frame, others, plate.moves) / allowed)
+            witnesses.append((_from_neighbours(frame, others, plate.moves) / allowed, 0.7))
         rows = [
             components(strength, level, frame, ground, worth)
-            for strength, worth in zip(strengths, (1.0, 0.7), strict=False)
-            for level in _LEVELS
+            for strength, worth in witnesses
+            for level in (1.0, 2.5, 6.0)  # tolerances by which what is connected differs
         ]
         found.append(Candidates.of(i, here, _distinct(np.concatenate(rows))))
         found[-1].colour[:] /= lit
@@ -456,19 +445,18 @@ def followed(
     box, fit = np.full((n, 4), np.nan), np.zeros(n)
     like = np.ones(len(found.frame))  # of what is not looked at, nothing is said
     bounds = np.searchsorted(found.frame, np.arange(n + 1))
+    first, middle, size = seed
+    box[first], fit[first] = [*middle, *size], 1.0
     for way in (1, -1):
-        looks: Appearance | None = None
-        last: list[tuple[int, Floats]] = []
         size, usual = seed[2].astype(float), 1.0
-        for i, frame in _in_order(frames, seed[0], way, n):
+        last = [(first, carry(maps[first], middle[None])[0])]
+        for i, frame in _in_order(frames, first, way, n):
             here = np.s_[bounds[i] : bounds[i + 1]]
-            if looks is None:
-                looks = Appearance(frame, seed[1], size, factor)
-                box[i], fit[i] = [*seed[1], *size], 1.0
-                last = [(i, carry(maps[i], seed[1][None])[0])]
-                like[here] = _likeness(looks, frame[::factor, ::factor], found.box[here])
-                continue
+            if i == first:
+                looks = Appearance(frame, middle, size, factor)
             like[here] = _likeness(looks, frame[::factor, ::factor], found.box[here])
+            if i == first:
+                continue
             gap = abs(i - last[-1][0])
             speed = np.zeros(2)
             if len(last) > 1:

@@ -39,7 +39,6 @@ from .steadying import CameraMotion, at_rest, carry, rescaled
 from .video import Reel, reduce
 
 _SHORTEST = 5  # frames of a path
-_ROUGH = 0.5  # confidence in a target that is not seen whole: it is known to about two pixels
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,8 +284,8 @@ def _together(
     at = np.flatnonzero(np.isfinite(looks.box[:, 0]))
     box, area = looks.box[at], 0.7 * looks.box[at, 2:].prod(axis=1)
     centre, worth = box[:, :2], np.clip(1.2 * looks.fit[at], 0.25, 0.8)
-    colour, behind = (np.tile(np.median(x, axis=0), (len(at), 1)) if len(x) else
-                      np.zeros((len(at), 3)) for x in (seen.colour, seen.behind))  # fmt: skip
+    colour = np.zeros((len(at), 3))
+    colour[:] = np.median(seen.colour, axis=0) if len(seen.colour) else 0
     bounds = np.searchsorted(seen.frame, np.arange(len(maps) + 1))
     for k, i in enumerate(at.tolist()):
         here = np.arange(bounds[i], bounds[i + 1])
@@ -295,12 +294,12 @@ def _together(
                     & (np.abs(np.log(seen.area[here] / area[k])) < 0.8)]  # fmt: skip
         if len(near):
             best = near[quality[near].argmax()]
-            colour[k], behind[k] = seen.colour[best], seen.behind[best]
+            colour[k] = seen.colour[best]
             worth[k] += 0.5 * quality[best]
             quality[near] += 0.5 * looks.fit[i]
     place = carry(maps[at], centre)
     alike = Candidates(at, place, centre, np.column_stack([centre - box[:, 2:] / 2, box[:, 2:]]),
-                       area, colour, behind, worth)  # fmt: skip
+                       area, colour, colour, worth)  # fmt: skip
     alike.quality[at == first] += TOLD
     kept = (seen.frame != first) | (not told)
     return Candidates.joined([seen._replace(quality=quality).only(kept), alike])
@@ -435,9 +434,9 @@ def _filled(
     Where only a part of it shows, its motion is surer, if that is known; else the looks, which are
     off by the same as in the frames around.
     """
-    n = len(found.pixels)
+    n, k = len(found.pixels), film.factor
     pixels, confidence = found.pixels.copy(), found.confidence.copy()
-    k = film.factor
+    rough = 0.5  # confidence in a target that is not seen whole: it is known to about two pixels
     alike = carry(film.motion.maps[:n], k * looks.box[:, :2] + (k - 1) / 2)
     side = k * np.sqrt(looks.box[:, 2:].prod(axis=1))
     expects = carry(film.motion.maps[:n], ways.centre)
@@ -456,12 +455,12 @@ def _filled(
         size, view = ways.box[i, 2:].mean(), views[i]
         beside = np.concatenate([at[at < i][-4:], at[at > i][:4]])
         if len(beside) == 8 and np.ptp(beside) < 40:
-            way, rough = (_curve(beside - i, pixels[beside], degree) for degree in (3, 2))
-            known = np.linalg.norm(way - rough) < (0.25 * size if told else min(0.25 * size, 2))
+            way, other = (_curve(beside - i, pixels[beside], degree) for degree in (3, 2))
+            known = np.linalg.norm(way - other) < (0.25 * size if told else min(0.25 * size, 2))
             there = carry(film.motion.maps[i], view.centroid[None])[0] if view else np.inf
             part = np.linalg.norm(there - way) < 0.75 * size
             if known and (part or (on[i] and looks.fit[i] > 0.5 * usual)):
-                pixels[i], confidence[i] = way, _ROUGH
+                pixels[i], confidence[i] = way, rough
                 continue
         if not told and view is not None:  # what hides a part of it draws its looks aside
             continue
@@ -471,7 +470,7 @@ def _filled(
         near = at[np.argsort(np.abs(at - i), kind="stable")[:15]]
         near = near[on[near]]
         shift = np.median((found.pixels - alike)[near], axis=0) if len(near) > 2 else 0
-        pixels[i], confidence[i] = alike[i] + shift, _ROUGH
+        pixels[i], confidence[i] = alike[i] + shift, rough
     if not len(at) and np.isfinite(pixels[:, 0]).any():
         looks_only = "no view tells it from its ground: it is followed by its looks alone"
         return replace(found, pixels=pixels, confidence=confidence, warnings=(looks_only,))

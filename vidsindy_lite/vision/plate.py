@@ -16,8 +16,6 @@ from ..arrays import Bools, Floats, Floats32, Image
 from .background import STRIP, changes, light, median_image
 from .steadying import carry
 
-_SHOWN = 3  # samples that must show a place of the plate
-
 
 class Plate:
     """The steadied background, of frames of one size.
@@ -76,7 +74,8 @@ class Plate:
         self.image, count = _masked_median(
             shown, [shows[i] for i in use], moves, np.reciprocal(lights[use]), (width, height)
         )
-        self.valid = np.where(count >= _SHOWN, 255, 0).astype(np.uint8)
+        # Samples that must show a place of the plate.
+        self.valid = np.where(count >= 3, 255, 0).astype(np.uint8)
         if hidden is not None:
             self._continue([shows[i] for i in use], moves, count)
 
@@ -101,6 +100,13 @@ class Plate:
             self.image[window] = cv2.inpaint(
                 self.image[window], never[window], 3, cv2.INPAINT_TELEA
             )
+
+    def laid(self, image: Floats32, here: Floats) -> Floats32:
+        """An image over the plate, as the frame that the map carries sees it; 1000 beyond it."""
+        if not self.moves:
+            return image
+        back, size = np.linalg.inv(self.shift @ here), self.size.tolist()
+        return np.asarray(cv2.warpPerspective(image, back, size, borderValue=1e3), np.float32)
 
     def seen_from(
         self, here: Floats, low: Floats | None = None, high: Floats | None = None, step: int = 1
