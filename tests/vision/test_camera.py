@@ -44,7 +44,7 @@ def asked(tmp_path, monkeypatch):
             return say
 
         monkeypatch.setattr(camera, "stands_still", lambda _: still)
-        monkeypatch.setattr(camera, "_steadied", witness("steadied"))
+        monkeypatch.setattr(camera, "_followed", witness("steadied"))
         monkeypatch.setattr(camera, "trembling", witness("together"))
         small = np.array(list(film))
         return *camera_motion(film, small, np.arange(len(small))), order

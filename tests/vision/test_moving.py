@@ -16,10 +16,10 @@ from vidsindy_lite.vision.moving import Film, expected, finished
 from vidsindy_lite.vision.refining import View, fitting, joined, scatter
 from vidsindy_lite.vision.steadying import (
     CameraMotion,
-    Steadying,
     at_rest,
     carry,
     stands_still,
+    steadied,
 )
 from vidsindy_lite.vision.video import Reel
 
@@ -123,11 +123,8 @@ def test_the_camera_is_followed(camera):
     scene = cv2.GaussianBlur(rng.uniform(0, 255, (340, 420, 3)).astype(np.float32), (0, 0), 2)
     scene = np.clip(128 + 6 * (scene - 128), 0, 255)
     move = np.array([[1, 0, -50], [0, 1, -50], [0, 0, 1.0]])
-    steadying = Steadying(1)
     views = [cv2.warpPerspective(scene, m @ move, (320, 240)).astype(np.uint8) for m in maps]
-    for view in views:
-        steadying.add(view)
-    motion = steadying.motion()
+    motion = steadied(views, 1)
     points = np.array([[40, 40], [280, 40], [40, 200], [280, 200.0]])
     for here, true in zip(motion.maps, maps, strict=True):
         assert np.abs(carry(here, carry(true, points)) - points).max() < 0.5

@@ -102,8 +102,6 @@ def candidates(
         lit = light(frame, ground, known)
         lights.append(lit)
         differs = lengths(changes(frame, ground, lit))
-        if plate.unsure is not None:  # a guess says nothing of what is within its error
-            differs = np.maximum(differs - plate.laid(plate.unsure, here), 0)
         witnesses = [(differs / allowed * known, 1.0)]
         if others:
             witnesses.append((_from_neighbours(frame, others, plate.moves) / allowed, 0.7))
@@ -423,9 +421,8 @@ def _top(values: Floats) -> float:
 
 
 def followed(
-    frames: Reel, maps: Floats, found: Candidates, seed: tuple[int, Floats, Floats],
-    guide: Floats,
-) -> Looks:  # fmt: skip
+    frames: Reel, maps: Floats, found: Candidates, seed: tuple[int, Floats, Floats]
+) -> Looks:
     """Follow a target by its looks, both ways.
 
     Parameters
@@ -437,8 +434,6 @@ def followed(
     found : Candidates
     seed : int, ndarray, ndarray
         A frame in which the target is known, its centre and size there, in reduced pixels.
-    guide : ndarray, shape (n, 2)
-        Where a path leads; NaN where none does.
     """
     n = len(maps)
     factor = frames.factor if frames.whole.few else 1
@@ -464,7 +459,7 @@ def followed(
             ahead = carry(np.linalg.inv(maps[i]), (last[-1][1] + speed * min(gap, 8))[None])[0]
             near = _near(found.only(here), like[here], ahead, size, gap)
             tries: list[Floats] = []
-            for one in [ahead, *near] if np.isnan(guide[i, 0]) else [ahead, guide[i], *near]:
+            for one in [ahead, *near]:
                 if not any(np.linalg.norm(one - other) < size.min() / 4 for other in tries):
                     tries.append(one)
             best = -np.inf, ahead, 0.0, 0.0, False
@@ -481,7 +476,7 @@ def followed(
             # What differs from the ground and has its colours may be blurred or turned.
             sure = answer > max(0.12, 0.35 * usual) or (moved and colour > 0.5)
             if not (inside and sure):
-                if gap > 60 and np.isnan(guide[i, 0]):
+                if gap > 60:
                     break
                 continue
             usual = 0.95 * usual + 0.05 * answer

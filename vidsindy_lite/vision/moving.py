@@ -141,8 +141,6 @@ def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
     for _ in range(4):  # of a target that covers its own ground, until the ground is without it
         seen, lights = sighted(film, boxes)
         n = min(n, len(lights))
-        if seed is not None and boxes is None:
-            seed = _tightened(seen, seed)
         paths = _paths(seen, hint, seed)
         if not paths and seed is None:
             return nothing(film.motion, n)
@@ -156,10 +154,8 @@ def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
         boxes = covered
     if seed is None and boxes is not None and _turns_only(seen, rows):
         return nothing(film.motion, n)
-    guide = np.full((n, 2), np.nan)
-    guide[seen.frame[rows]] = seen.centre[rows]
     start = seed or _plainest(seen, rows)
-    looks = followed(frames, film.maps[:n], seen, start, guide)
+    looks = followed(frames, film.maps[:n], seen, start)
     both = _together(seen, looks, film.maps, start[0], told=seed is not None)
     rows, _ = best_path(both)
     if len(rows) < _SHORTEST:
@@ -203,18 +199,6 @@ def _paths(
         liked = seen._replace(quality=seen.quality * hint.likeness(seen.colour, seen.behind))
     # Of less, noise is made.
     return [path for path in plainest_paths(liked) if np.median(seen.quality[path.rows]) > 0.2]
-
-
-def _tightened(seen: Candidates, seed: tuple[int, Floats, Floats]) -> tuple[int, Floats, Floats]:
-    """A box that is drawn loosely around one plain thing, close around it."""
-    frame, centre, size = seed
-    here = (seen.frame == frame) & (np.abs(seen.centre - centre) < size / 4).all(axis=1)
-    inside = np.flatnonzero(here & (seen.box[:, 2:] < size).all(axis=1) & (seen.quality > 0.8))
-    if not len(inside):
-        return seed
-    best = inside[seen.area[inside].argmax()]
-    loose = seen.area[best] < 0.4 * 0.7 * size.prod()
-    return (frame, seen.centre[best], np.maximum(seen.box[best, 2:], 4)) if loose else seed
 
 
 def _plainest(seen: Candidates, rows: Ints) -> tuple[int, Floats, Floats]:

@@ -45,7 +45,6 @@ class Plate:
         self.size = size
         self.moves = not np.allclose(maps, np.eye(3))
         self.shift = np.eye(3)
-        self.unsure: Floats32 | None = None
         if lights is None:
             lights = np.ones((len(samples), 3), np.float32)
         if not self.moves and hidden is None and (lights == 1).all():
@@ -80,10 +79,7 @@ class Plate:
             self._continue([shows[i] for i in use], moves, count)
 
     def _continue(self, shows: Sequence[Image], moves: Sequence[Floats], count: Image) -> None:
-        """Ground that the target hides is what is seen of it, or what is around it.
-
-        Such a guess is as unsure as what is around it varies.
-        """
+        """Ground that the target hides is what is seen of it, or what is around it."""
         size = self.image.shape[1::-1]
         covered = np.zeros(self.valid.shape, np.uint8)
         for one, move in zip(shows, moves, strict=True):
@@ -94,9 +90,6 @@ class Plate:
         left, top, width, height = cv2.boundingRect(never)
         if width:
             window = np.s_[max(top - 8, 0) : top + height + 8, max(left - 8, 0) : left + width + 8]
-            known = (never[window] == 0) & (self.valid[window] > 0)
-            spread = np.sqrt(self.image[window][known].var(axis=0).sum()) if known.any() else 0.0
-            self.unsure = np.float32(spread) * never
             self.image[window] = cv2.inpaint(
                 self.image[window], never[window], 3, cv2.INPAINT_TELEA
             )
