@@ -9,7 +9,7 @@ from vidsindy_lite import track
 from vidsindy_lite.vision import camera
 from vidsindy_lite.vision.background import sample_frames
 from vidsindy_lite.vision.camera import camera_motion, explains, rests, trembling
-from vidsindy_lite.vision.steadying import CameraMotion, at_rest, carry
+from vidsindy_lite.vision.steadying import at_rest, carry
 from vidsindy_lite.vision.video import Reel, reduce, write_video
 
 SHIFTS = np.array([[0, 0], [2, 1], [-1, 2], [1, -2], [2, 2], [-2, 0], [0, -1], [1, 1]])
@@ -25,59 +25,6 @@ def views(softness):
         view = scene[10 + down : 250 + down, 10 + right : 330 + right]
         noisy = view + rng.normal(0, 2, view.shape)
         yield np.repeat(np.clip(noisy, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
-
-
-@pytest.fixture
-def asked(tmp_path, monkeypatch):
-    """Asks witnesses that say what they are told to, and returns the motion and who was asked."""
-
-    def ask(still=False, **errors):
-        film = Reel(write_video(tmp_path / "clip.mov", views(2.5)))
-        order = []
-
-        def witness(name):
-            def say(*_):
-                order.append(name)
-                error = errors.get(name)
-                return None if error is None else CameraMotion(np.eye(3)[None], np.array([error]))
-
-            return say
-
-        monkeypatch.setattr(camera, "stands_still", lambda _: still)
-        monkeypatch.setattr(camera, "_followed", witness("steadied"))
-        monkeypatch.setattr(camera, "trembling", witness("together"))
-        small = np.array(list(film))
-        return *camera_motion(film, small, np.arange(len(small))), order
-
-    return ask
-
-
-@pytest.mark.parametrize(
-    ("still", "errors", "order", "error"),
-    [
-        (False, {"steadied": 0.1, "together": 0.0}, ["steadied"], 0.1),
-        (False, {"together": 0.1}, ["steadied", "together"], 0.1),
-        (False, {"steadied": 2.0, "together": 3.0}, ["steadied", "together"], 2.0),
-        (False, {"steadied": 3.0, "together": 2.0}, ["steadied", "together"], 2.0),
-        (None, {"steadied": 0.0, "together": 0.1}, ["together"], 0.1),
-    ],
-)
-def test_witnesses_are_asked_until_one_is_exact(asked, still, errors, order, error):
-    motion, sure, said = asked(still, **errors)
-    assert said == order
-    assert sure
-    assert motion.errors == [error]
-
-
-@pytest.mark.parametrize(
-    ("still", "order", "certain"),
-    [(True, [], True), (None, ["together"], False), (False, ["steadied", "together"], False)],
-)
-def test_without_a_witness_the_camera_is_at_rest(asked, still, order, certain):
-    motion, sure, said = asked(still)
-    assert said == order
-    assert not motion.moves
-    assert sure is certain  # these frames do not fit together where they are
 
 
 def test_a_camera_that_trembles_before_grains_is_followed(tmp_path):

@@ -160,19 +160,6 @@ def test_a_target_is_expected_on_its_way_between_its_sightings_and_three_frames_
     np.testing.assert_allclose(ways.box[near, 2:], [[12, 6]] * near.sum())
 
 
-def test_a_target_is_expected_in_frames_of_the_film_only():
-    last = followed_to(n=16)
-    np.testing.assert_array_equal(np.isfinite(last.centre[:, 0]), np.arange(16) >= 3)
-    first = followed_to(at=(1, 2, 3, 4, 5))
-    np.testing.assert_array_equal(np.isfinite(first.centre[:, 0]), np.arange(30) <= 8)
-
-
-def test_a_path_of_two_sightings_is_carried_on_in_a_line():
-    before, first, last, after = followed_to(at=(6, 8)).centre[4:11:2]
-    np.testing.assert_allclose(before, 2 * first - last)
-    np.testing.assert_allclose(after, 2 * last - first)
-
-
 def test_a_target_is_expected_where_the_camera_sees_it_in_whole_frames():
     plain = followed_to()
     k = np.arange(30)
@@ -188,13 +175,6 @@ def test_a_target_is_expected_where_the_camera_sees_it_in_whole_frames():
     np.testing.assert_allclose(whole.box[near], 3 * plain.box[near])
 
 
-def test_the_colour_that_is_expected_is_half_that_of_the_path_and_half_the_nearest():
-    # It is (50, 80, 20) in its first frame, 6, then (90, 80, 20).
-    colour = followed_to().colour
-    np.testing.assert_allclose(colour[[0, 3, 6, 7, 14, 29], 0], [90, 70, 70, 90, 90, 90])
-    np.testing.assert_allclose(colour[:, 1:], [[80, 20]] * 30)
-
-
 def test_a_film_knows_which_of_its_frames_are_its_samples(tmp_path, monkeypatch):
     ground = np.full((48, 64, 3), 100, np.uint8)
     frames = Reel(write_video(tmp_path / "clip.mov", [ground] * 41))
@@ -205,16 +185,6 @@ def test_a_film_knows_which_of_its_frames_are_its_samples(tmp_path, monkeypatch)
     monkeypatch.setattr(moving, "camera_motion", lambda *_: (at_rest(36), True))
     film = Film.of(frames, samples)
     np.testing.assert_array_equal(film.sampled, np.minimum(np.arange(0, 41, 2), 35))
-
-
-def test_partial_views_and_jumps_are_left_out():
-    frames = np.arange(40)
-    places = np.column_stack([3.0 * frames, 50 + 20 * np.sin(frames / 6)])
-    areas = np.full(40, 100.0)
-    areas[10] = 40
-    places[25] += 15
-    good = fitting(frames, places, areas, np.arange(40) != 5)
-    np.testing.assert_array_equal(np.flatnonzero(~good), [5, 10, 25])
 
 
 @pytest.mark.parametrize("end", [np.s_[:2], np.s_[-2:]])

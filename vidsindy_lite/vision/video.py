@@ -105,15 +105,12 @@ def upper_field(frame: VideoFrame) -> Image:
     )
     graph.link_nodes(source, graph.add("field", "type=top"), graph.add("buffersink")).configure()
     graph.push(frame)
-    lines = cast("VideoFrame", graph.pull()).to_ndarray(format="bgr24", threads=1)
-    return with_lines_between(_turned(cast("Image", lines)))[: frame.height]
-
-
-def with_lines_between(field: Image) -> Image:
-    """A field with the mean of two lines between them, and the last one twice."""
+    pulled = cast("VideoFrame", graph.pull())
+    field = _turned(cast("Image", pulled.to_ndarray(format="bgr24", threads=1)))
+    # Between two lines their mean, and the last one twice.
     lower = np.concatenate((field[1:], field[-1:]))
     between = ((field.astype(np.uint16) + lower + 1) // 2).astype(np.uint8)
-    return np.stack((field, between), axis=1).reshape(-1, *field.shape[1:])
+    return np.stack((field, between), axis=1).reshape(-1, *field.shape[1:])[: frame.height]
 
 
 class Stills(NamedTuple):
