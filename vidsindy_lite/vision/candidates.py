@@ -23,9 +23,8 @@ time near where its motion leads and near the candidates there.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterable, Iterator
-from itertools import chain, repeat
+from itertools import chain, islice, repeat, tee
 from typing import Any, NamedTuple, Self
 
 import cv2
@@ -38,7 +37,6 @@ from .plate import Plate, least_difference, tolerance
 from .steadying import carry
 from .video import Reel
 
-_APART = 3  # frames to the neighbours with which a frame is compared
 _KEPT = 16  # candidates of a frame
 GAP = 15  # frames that a path may miss
 TOLD = 20.0  # quality of a candidate that somebody points at
@@ -121,14 +119,13 @@ def _with_neighbours(
     frames: Iterable[Image], maps: Floats
 ) -> Iterator[tuple[Image, Floats, list[tuple[Image, Floats]]]]:
     """Each frame and its map, and some frames before and after it with maps that lay them on it."""
-    window: deque[tuple[Image, Floats] | None] = deque([None] * _APART, maxlen=2 * _APART + 1)
-    for one in chain(zip(frames, maps, strict=False), repeat(None, _APART)):
-        window.append(one)
-        if len(window) <= _APART or (middle := window[-1 - _APART]) is None:
-            continue
-        back = np.linalg.inv(middle[1])
-        beside = [window[0] if len(window) > 2 * _APART else None, window[-1]]
-        yield *middle, [(other[0], back @ other[1]) for other in beside if other is not None]
+    apart = 3  # frames to the neighbours with which a frame is compared
+    first, middles, last = tee(zip(frames, maps, strict=False), 3)
+    before = chain(repeat(None, apart), first)
+    after = chain(islice(last, apart, None), repeat(None))
+    for (frame, here), *beside in zip(middles, before, after, strict=False):
+        back = np.linalg.inv(here)
+        yield frame, here, [(one[0], back @ one[1]) for one in beside if one is not None]
 
 
 def _from_neighbours(frame: Image, others: list[tuple[Image, Floats]], moves: bool) -> Floats32:

@@ -304,13 +304,11 @@ def lens_of(samples: Image, film: Film, *ways: Ways) -> Lens:
 
 def viewed(film: Film, lens: Lens, ways: Ways, lights: list[Floats32]) -> list[View | None]:
     """The target in whole frames, near where it is expected."""
-    views = []
-    for i, (frame, here) in enumerate(zip(film.frames.whole, film.motion.maps, strict=False)):
-        view = None
-        if i < len(ways.centre) and np.isfinite(ways.centre[i, 0]):
-            view = lens.look(frame, here, ways.box[i], ways.centre[i], ways.colour[i], lights[i])
-        views.append(view)
-    return views
+    shown = zip(film.frames.whole, film.motion.maps, *ways, lights, strict=False)
+    return [
+        lens.look(frame, here, box, centre, colour, light) if np.isfinite(centre[0]) else None
+        for frame, here, centre, box, colour, light in shown
+    ]
 
 
 def nothing(motion: CameraMotion, n: int) -> Track:
@@ -352,8 +350,7 @@ def expected(seen: Candidates, rows: Ints, film: Film, n: int) -> Ways:
     for outside, end in ((frames < at[0], slice(0, 4)), (frames > at[-1], slice(-4, None))):
         if outside.any():
             fit = np.polyfit(at[end] - at[end][0], place[end], min(2, len(at[end]) - 1))
-            t = frames[outside] - at[end][0]
-            along[outside] = np.column_stack([np.polyval(fit[:, k], t) for k in (0, 1)])
+            along[outside] = np.vander(frames[outside] - at[end][0], len(fit)) @ fit
     extent = np.column_stack([np.interp(frames, at, x) for x in seen.box[rows, 2:].T])
     centre, box, colour = np.full((n, 2), np.nan), np.full((n, 4), np.nan), np.zeros((n, 3))
     centre[frames] = carry(np.linalg.inv(film.maps[frames]), along)
@@ -439,7 +436,7 @@ def _filled(
         size, view = ways.box[i, 2:].mean(), views[i]
         beside = np.concatenate([at[at < i][-4:], at[at > i][:4]])
         if len(beside) == 8 and np.ptp(beside) < 40:
-            way, other = (_curve(beside - i, pixels[beside], degree) for degree in (3, 2))
+            way, other = (np.polyfit(beside - i, pixels[beside], degree)[-1] for degree in (3, 2))
             known = np.linalg.norm(way - other) < (0.25 * size if told else min(0.25 * size, 2))
             there = carry(film.motion.maps[i], view.centroid[None])[0] if view else np.inf
             part = np.linalg.norm(there - way) < 0.75 * size
@@ -459,9 +456,3 @@ def _filled(
         looks_only = "no view tells it from its ground: it is followed by its looks alone"
         return replace(found, pixels=pixels, confidence=confidence, warnings=(looks_only,))
     return replace(found, pixels=pixels, confidence=confidence)
-
-
-def _curve(frames: Ints, places: Floats, degree: int) -> Floats:
-    """Where a polynomial of the time through places (m, 2) is at the time 0."""
-    powers = np.vander(frames / 10, degree + 1)
-    return np.asarray(np.linalg.lstsq(powers, places)[0][-1])

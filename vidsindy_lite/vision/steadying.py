@@ -119,12 +119,12 @@ def _as_similarity(guess: Floats, size: Ints) -> Floats:
 
     Other parts of it, as perspective, would stay as they are, since nothing is fitted to them.
     """
-    u, v = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]).T * size[:, None]
-    zero, one = np.zeros(4), np.ones(4)
-    ends = guess @ [u, v, one]
-    rows = np.concatenate([np.column_stack([u, -v, one, zero]), np.column_stack([v, u, zero, one])])
-    c, s, right, down = np.linalg.lstsq(rows, (ends[:2] / ends[2]).ravel())[0]
-    return np.array([[c, -s, right], [s, c, down], [0, 0, 1]])
+    corners = np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]]) * size
+    # As complex numbers, places are turned, scaled and shifted by a line.
+    turn, shift = np.polyfit(corners @ [1, 1j], carry(guess, corners) @ [1, 1j], 1)
+    return np.array(
+        [[turn.real, -turn.imag, shift.real], [turn.imag, turn.real, shift.imag], [0, 0, 1]]
+    )
 
 
 def _fit(

@@ -421,13 +421,9 @@ def read_video(path: str | os.PathLike) -> Iterator[Image]:
     FileNotFoundError, ValueError
         At once, if the file is missing, empty, not a video, or holds no frame.
     """
-    stills = find_stills(check_path("path", path))
-    if stills:
-        stills.read(0, 16)
-        return stills.pick(range(len(stills.files)))
-    with _opened(path) as (container, stream):
-        _first(path, container, stream)
-    return _images(path)
+    _first(path)
+    stills = find_stills(Path(path))
+    return stills.pick(range(len(stills.files))) if stills else _images(path)
 
 
 def read_frame(path: str | os.PathLike, number: int) -> Image:
@@ -476,11 +472,7 @@ def video_info(path: str | os.PathLike) -> VideoInfo:
     FileNotFoundError, ValueError
         If the file is missing, empty, not a video, or holds no frame.
     """
-    stills = find_stills(check_path("path", path))
-    if stills:
-        return VideoInfo(len(stills.files), 0.0, stills.read(0, 16).shape[1::-1])
-    with _opened(path) as (container, stream):
-        size = _first(path, container, stream).shape[1::-1]
+    size = _first(path).shape[1::-1]
     clock, rate = _clock(path)
     return VideoInfo(len(clock), rate, size)
 
@@ -505,14 +497,13 @@ def frame_clock(path: str | os.PathLike) -> Floats:
     FileNotFoundError, ValueError
         See `read_video`.
     """
-    stills = find_stills(check_path("path", path))
-    if stills:
-        return stills.clock
     return _clock(path)[0]
 
 
 def _clock(path: str | os.PathLike) -> tuple[Floats, float]:
     """When each frame was taken, those included that were cut off a file later; and their rate."""
+    if stills := find_stills(check_path("path", path)):
+        return stills.clock, 0.0
     with _opened(path) as (container, stream):
         stated, hidden, packets, end = stream.frames, 0, [], 0.0
         for packet in container.demux():
@@ -535,8 +526,7 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
     In a video, the packets say, without being decoded, when each frame is shown and where decoding
     can begin: a jump meets the right frame, also where frames are not evenly spaced in time.
     """
-    stills = find_stills(check_path("path", path))
-    if stills:
+    if stills := find_stills(check_path("path", path)):
         yield from stills.pick(numbers)
         return
     with _opened(path) as (container, stream):
@@ -609,12 +599,13 @@ def _decoded(
             yield from packet.decode()
 
 
-def _first(path: str | os.PathLike, container: InputContainer, stream: VideoStream) -> Image:
-    """The first frame of a file just opened, which must have one."""
-    frame = next(_decoded(container, stream), None)
-    if frame is None:
-        raise ValueError(f"path: must hold at least one frame, got none in '{path}'")
-    return _image(frame)
+def _first(path: str | os.PathLike) -> Image:
+    """The first frame of a film, which must have one."""
+    if stills := find_stills(check_path("path", path)):
+        return stills.read(0, 16)
+    for image in _images(path):
+        return image
+    raise ValueError(f"path: must hold at least one frame, got none in '{path}'")
 
 
 def _images(path: str | os.PathLike) -> Iterator[Image]:
