@@ -175,7 +175,7 @@ def test_changing_light_loses_no_frames(tmp_path, light):
     assert any("the light changes" in doubt for doubt in track(path, "background").warnings)
 
 
-@pytest.mark.parametrize("when", [4, 15, 30, 45, 55])
+@pytest.mark.parametrize("when", [4, 30, 55])
 @pytest.mark.parametrize("hinted", [False, True])
 def test_one_push_of_the_camera_is_taken_out(tmp_path, when, hinted):
     move = np.float32([[1, 0, 5], [0, 1, 3]])
@@ -206,13 +206,8 @@ def test_something_else_that_moves_is_not_followed_unsaid(tmp_path, radius):
 
 def test_a_target_that_is_lost_in_many_frames_is_told(tmp_path):
     truth = places()
-    truth[8:22] = truth[28:48] = np.nan
-
-    def hidden(image, i):
-        return image
-
-    ground = [np.where(np.isfinite(truth), truth, -50)]
-    found = track(film(tmp_path / "clip.mov", hidden, ground[0]))
+    truth[8:22] = truth[28:48] = -50
+    found = track(film(tmp_path / "clip.mov", lambda image, i: image, truth))
     assert np.isnan(found.pixels[32:43]).all()
     assert any("is lost in 34 of 60 frames" in doubt for doubt in found.warnings)
 
@@ -269,8 +264,6 @@ def test_what_is_hidden_altogether_stays_a_gap(tmp_path):
 # ---- targets of several colours: the middle of the whole, however it turns
 
 
-SIZE = 200, 150
-LENGTH = 60
 HALVES = {
     "red and white": ((30, 30, 210), (240, 240, 240)),
     "black and white": ((20, 20, 25), (235, 235, 235)),
@@ -304,8 +297,7 @@ def beach_ball(path, radius, rate, colours, flicker):
     return write_video(path, frames())
 
 
-@pytest.mark.parametrize("flicker", [0.0, 0.05])
-@pytest.mark.parametrize("rate", [0.04, 0.3])
+@pytest.mark.parametrize(("rate", "flicker"), [(0.04, 0.05), (0.3, 0.0)])
 @pytest.mark.parametrize("colours", HALVES)
 def test_a_ball_of_two_halves_that_turns(tmp_path, colours, rate, flicker):
     path = beach_ball(tmp_path / "clip.mov", 12, rate, HALVES[colours], flicker)

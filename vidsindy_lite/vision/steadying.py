@@ -119,7 +119,7 @@ def _as_similarity(guess: Floats, size: Ints) -> Floats:
 
     Other parts of it, as perspective, would stay as they are, since nothing is fitted to them.
     """
-    corners = np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]]) * size
+    corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * size.astype(float)
     # As complex numbers, places are turned, scaled and shifted by a line.
     turn, shift = np.polyfit(corners @ [1, 1j], carry(guess, corners) @ [1, 1j], 1)
     return np.array(
