@@ -1,6 +1,5 @@
 """The tracker for films that people make: phone footage with known truth, hints, real clips."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import cv2
@@ -255,15 +254,21 @@ def test_views_of_the_target_and_something_like_it_in_one_are_left_out():
     assert not joined(areas).any()
 
 
+def along(n, areas=100.0, half=5.0, **looks):
+    """Views of a square that travels to the right, all clear of the border."""
+    square = half * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+    places = np.column_stack([4 * half + 3.0 * np.arange(n), np.full(n, 10 * half)])
+    return [
+        View(place, area, np.zeros(3), True, place + square, **looks)
+        for place, area in zip(places, np.full(n, areas), strict=True)
+    ]
+
+
 def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
-    square = np.array([[-5.0, -5], [5, -5], [5, 5], [-5, 5]])
-    places = [np.array([20.0 + 3 * k, 50]) for k in range(20)]
-    views = [View(place, 100.0, np.zeros(3), True, place + square) for place in places]
-    errors = np.zeros(20)
-    maps = np.tile(np.eye(3), (20, 1, 1))
+    views, errors, maps = along(20), np.zeros(20), np.tile(np.eye(3), (20, 1, 1))
     assert finished(views, CameraMotion(maps, errors), ()).warnings == ()
-    larger = [replace(view, area=300.0) for view in views[12:]]
-    (doubt,) = finished(views[:12] + larger, CameraMotion(maps, errors), ()).warnings
+    larger = along(20, np.where(np.arange(20) < 12, 100.0, 300.0))
+    (doubt,) = finished(larger, CameraMotion(maps, errors), ()).warnings
     assert doubt.startswith("from frame 12 on, what is followed has another size at once")
     errors[16:] = np.inf
     found = finished(views, CameraMotion(maps, errors), ())
@@ -275,37 +280,22 @@ def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
 
 @pytest.mark.parametrize(("part", "told"), [(0.99, False), (0.8, True)])
 def test_an_outline_that_changes_from_frame_to_frame_is_told(part, told):
-    square = np.array([[-50.0, -50], [50, -50], [50, 50], [-50, 50]])
-    places = [np.array([90.0 + 3 * k, 90]) for k in range(40)]
     areas = 1e4 * np.where(np.random.default_rng(0).random(40) < 0.5, part, 1)
-    views = [
-        View(place, area, np.zeros(3), True, place + square)
-        for place, area in zip(places, areas, strict=True)
-    ]
-    found = finished(views, at_rest(40), ())
+    found = finished(along(40, areas, 50.0), at_rest(40), ())
     assert any("outline of the target" in doubt for doubt in found.warnings) == told
     assert (np.median(found.confidence) < np.exp(-2 / 3)) == told
 
 
-def test_views_before_ground_of_the_targets_colour_are_left_out_unless_all_are():
-    square = np.array([[-5.0, -5], [5, -5], [5, 5], [-5, 5]])
-    places = [np.array([20.0 + 3 * k, 50]) for k in range(20)]
-    maps = np.tile(np.eye(3), (20, 1, 1))
-    for faint in (8, 20):
-        views = [
-            View(place, 100.0, np.zeros(3), True, place + square, faint=k < faint)
-            for k, place in enumerate(places)
-        ]
-        seen = np.isfinite(finished(views, CameraMotion(maps, np.zeros(20)), ()).pixels[:, 0])
-        np.testing.assert_array_equal(seen, (np.arange(20) >= faint) | (faint == 20))
+@pytest.mark.parametrize("faint", [8, 20])
+def test_views_before_ground_of_the_targets_colour_are_left_out_unless_all_are(faint):
+    views = along(20, faint=True)[:faint] + along(20)[faint:]
+    seen = np.isfinite(finished(views, at_rest(20), ()).pixels[:, 0])
+    np.testing.assert_array_equal(seen, (np.arange(20) >= faint) | (faint == 20))
 
 
 @pytest.mark.parametrize(("seen", "found"), [(9, False), (11, True)])
 def test_a_target_is_seen_in_a_twentieth_of_the_frames_at_least(seen, found):
-    square = np.array([[-5.0, -5], [5, -5], [5, 5], [-5, 5]])
-    places = [np.array([20.0 + 3 * k, 50]) for k in range(seen)]
-    views = [View(place, 100.0, np.zeros(3), True, place + square) for place in places]
-    followed = finished(views + [None] * (200 - seen), at_rest(200), ())
+    followed = finished(along(seen) + [None] * (200 - seen), at_rest(200), ())
     assert np.isfinite(followed.pixels[:, 0]).sum() == found * seen
 
 

@@ -41,6 +41,19 @@ def test_what_is_larger_or_smaller_at_once_and_remains_so_is_something_else(fact
     assert swapped(frames, areas) is None
 
 
+GROUND = np.full((60, 80, 3), (60, 90, 120), np.uint8)
+
+
+def look(frame, box, colour, centre=None, ground=GROUND):
+    """What a lens sees near a box before the ground."""
+    box = np.array(box, float)
+    centre = box[:2] + (box[2:] - 1) / 2 if centre is None else np.array(centre, float)
+    plate = Plate(np.stack([ground] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
+    return Lens(plate, 0.0).look(
+        frame, np.eye(3), box, centre, np.array(colour, float), np.ones(3, np.float32)
+    )
+
+
 def disc(centre, radius, size=(80, 60)):
     """How much of each pixel a disc covers, by pieces of a tenth."""
     u, v = (np.arange(10 * n) / 10 - 0.45 for n in size)
@@ -54,15 +67,13 @@ def test_the_centroid_and_area_of_a_disc_are_those_of_its_parts_of_pixels(centre
     ground = np.full((60, 80, 3), 90, np.uint8)
     share, colour = disc(centre, radius), np.array([30, 60, 220])
     frame = np.rint((1 - share) * ground + share * colour).astype(np.uint8)
-    plate = Plate(np.stack([ground] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
-    box = np.array([centre[0] - radius, centre[1] - radius, 2 * radius, 2 * radius])
-    gain = np.ones(3, np.float32)
-    view = Lens(plate, 0.0).look(frame, np.eye(3), box, np.array(centre), colour, gain)
+    box = [centre[0] - radius, centre[1] - radius, 2 * radius, 2 * radius]
+    view = look(frame, box, colour, centre, ground)
     assert view.inside
     assert view.area == pytest.approx(np.pi * radius**2, rel=0.01)
     np.testing.assert_allclose(view.centroid, centre, atol=0.02)
     np.testing.assert_allclose(view.colour, colour, atol=1)
-    assert Lens(plate, 0.0).look(ground, np.eye(3), box, np.array(centre), colour, gain) is None
+    assert look(ground, box, colour, centre, ground) is None
 
 
 @pytest.mark.parametrize(("shade", "faint"), [(90, False), (176, False), (192, True)])
@@ -71,11 +82,7 @@ def test_a_view_before_ground_of_about_its_own_colour_is_faint(shade, faint):
     ground[:, 10:70] = shade
     share = disc((40.0, 30.0), 8)
     frame = np.rint((1 - share) * ground + share * 200).astype(np.uint8)
-    plate = Plate(np.stack([ground] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
-    box, gain = np.array([32.0, 22, 16, 16]), np.ones(3, np.float32)
-    colour = np.full(3, 200.0)
-    view = Lens(plate, 0.0).look(frame, np.eye(3), box, np.array([40.0, 30]), colour, gain)
-    assert view.faint == faint
+    assert look(frame, (32, 22, 16, 16), [200] * 3, (40, 30), ground).faint == faint
 
 
 @pytest.mark.parametrize("colour", [(75, 130, 110), (70, 98, 122)])
@@ -83,26 +90,9 @@ def test_a_shadow_that_touches_the_target_is_no_part_of_it_unless_they_look_alik
     ground = np.full((60, 80, 3), (100, 140, 175), np.uint8)
     shade, share = 0.3 * disc((46.0, 36.0), 8), disc((38.0, 28.0), 8)
     frame = np.rint(share * np.array(colour) + (1 - share) * (1 - shade) * ground).astype(np.uint8)
-    plate = Plate(np.stack([ground] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
-    box, gain = np.array([30.0, 20, 17, 17]), np.ones(3, np.float32)
-    view = Lens(plate, 0.0).look(
-        frame, np.eye(3), box, np.array([38.0, 28.0]), np.array(colour, float), gain
-    )
+    view = look(frame, (30, 20, 17, 17), colour, (38, 28), ground)
     off = np.linalg.norm(view.centroid - [38, 28])
     assert off < 2 if colour == (75, 130, 110) else off > 4
-
-
-GROUND = np.full((60, 80, 3), (60, 90, 120), np.uint8)
-
-
-def look(frame, box, colour, centre=None, noise=0.0):
-    """What a lens sees near a box before the ground."""
-    box = np.array(box, float)
-    centre = box[:2] + (box[2:] - 1) / 2 if centre is None else np.array(centre, float)
-    plate = Plate(np.stack([GROUND] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
-    return Lens(plate, noise).look(
-        frame, np.eye(3), box, centre, np.array(colour, float), np.ones(3, np.float32)
-    )
 
 
 def painted(*blocks):
