@@ -1,7 +1,5 @@
 """The parts of the background model by themselves, on arrays whose answer is known."""
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 import pytest
@@ -174,15 +172,6 @@ def test_an_outline_is_as_soft_as_its_blur_whatever_its_length():
     assert softness(24, 1.5) > 2 * sharp
 
 
-def test_a_target_cut_off_by_the_window_or_the_image():
-    truth = np.column_stack([np.linspace(0, 108, 45), np.full(45, 48.0)])
-    frames = list(render(truth, Scene("sea", size=16, image_size=SIZE), 1))
-    model = learned(np.array(frames[::2]))
-    assert model.measure(frames[30], truth[30] + [9, 0], 9) is None
-    assert model.measure(frames[30], truth[30], 16).inside
-    assert not model.measure(frames[1], truth[1], 16).inside
-
-
 # ---------------------------------------------------------- squares on a plain ground: all is known
 
 
@@ -201,24 +190,6 @@ def squares(*boxes, colour=TARGET):
 def plain():
     """A model that has seen a square of 16 pixels in 20 places."""
     return learned(np.array([squares((4 + 5 * i, 4 + 3 * i, 16)) for i in range(20)]))
-
-
-def test_what_is_learned_of_a_square(plain):
-    np.testing.assert_array_equal(plain.background, squares())
-    assert plain.area == 16**2
-    np.testing.assert_array_equal(plain.colour, TARGET)
-    assert plain.noise == 0
-    assert plain.unrest == ()
-
-
-def test_search_finds_the_middle_of_a_square_and_looks_a_little_beyond_it(plain):
-    centre, half = plain.search(squares((40, 24, 16)))
-    np.testing.assert_array_equal(centre, [47.5, 31.5])
-    assert half == 4 * (4 / 2 + 1) + 4  # half its width, a coarse pixel, the ring on both sides
-    centre, half = plain.search(squares((80, 60, 8)))
-    np.testing.assert_array_equal(centre, [83.5, 63.5])
-    assert half == 4 * (2 / 2 + 1) + 4
-    assert plain.search(squares()) is None
 
 
 def test_search_prefers_what_has_the_colour_of_the_target(plain):
@@ -309,39 +280,6 @@ def test_samples_are_spread_from_the_first_frame_to_the_last(tmp_path):
 
 
 # ---------------------------------------------------------------------------------------- following
-
-
-class Seen:
-    """A model of a target in even motion, which notes where it is looked for."""
-
-    area = np.pi * 5**2
-    motion = np.array([[10.0 + 3 * i, 20.0 - 2 * i] for i in range(20)])
-
-    def __init__(self, hidden):
-        self.hidden, self.near, self.anywhere = hidden, {}, []
-
-    def search(self, number):
-        self.anywhere.append(number)
-        return self.motion[number], None
-
-    def measure(self, number, centre, half):
-        if half is not None:
-            self.near[number] = (centre, half)
-        whole = blob(inside=number % 2 == 0)  # a view across the border counts, too
-        return None if number in self.hidden else replace(whole, centroid=self.motion[number])
-
-
-def test_a_target_is_looked_for_where_its_motion_leads():
-    model = Seen(hidden=(4, 5, 9, 10, 11, 12))
-    found = list(track_blobs(model, range(20)))
-    assert [i for i, one in enumerate(found) if one is None] == [4, 5, 9, 10, 11, 12]
-    # Anywhere: at first, where it is not at its place, and at once after three such frames.
-    assert model.anywhere == [0, 4, 5, 9, 10, 11, 12, 13]
-    assert sorted(set(range(20)) - set(model.near)) == [0, 12, 13]
-    for number, (centre, half) in model.near.items():
-        still = number == 1  # one frame shows no motion
-        np.testing.assert_allclose(centre, model.motion[0 if still else number])
-        assert half == pytest.approx(2 * 5 + 8 + (0 if still else 0.5 * 3))
 
 
 @pytest.mark.parametrize(("reach", "shows"), [(3, True), (7, True), (30, False)])

@@ -12,7 +12,6 @@ from vidsindy_lite.__main__ import main
 from vidsindy_lite.vision import rendering as scenery
 from vidsindy_lite.vision import training
 from vidsindy_lite.vision.network import anchors
-from vidsindy_lite.vision.rendering import LabelledFrame
 
 # Mean and standard deviation of the training frames of seeds 0 to 23.
 FRAMES = (
@@ -100,25 +99,6 @@ def test_training_frames_show_what_their_labels_say(seed):
     assert 0 <= drawn.visible <= 1 + 1e-9
     assert np.array_equal(np.isnan(centre), np.isnan(drawn.extent))
     assert drawn.visible == 0 or (drawn.extent > 3).all()
-
-
-def test_labels_of_a_batch_say_how_much_of_the_target_is_seen(monkeypatch):
-    shown = iter([(1.0, 1.0), (0.95, 1.0), (0.775, 0.5), (0.6, 0.0), (0.0, 0.0)])
-    wanted = []
-
-    def frame(rng, pool):
-        visible, presence = next(shown)
-        wanted.append(presence)
-        image = np.zeros((training.SIDE, training.SIDE, 3), np.uint8)
-        return LabelledFrame(image, np.array([20.0, 10.0]), visible), np.array([30.0, 40.0])
-
-    monkeypatch.setattr(training, "BATCH", 5)
-    monkeypatch.setattr(training, "training_frame", frame)
-    images, centres, sizes, presence = training._batch(0, 0, None)
-    assert images.shape == (5, 3, training.SIDE, training.SIDE)
-    np.testing.assert_allclose(presence, wanted, atol=1e-6)
-    np.testing.assert_allclose(centres, [[30, 40]] * 5)
-    np.testing.assert_allclose(sizes, [[20, 10]] * 5)
 
 
 def test_the_larger_a_target_the_more_anchors_are_to_be_sure_of_it():
