@@ -176,9 +176,12 @@ class Lens:
             return None
         view = self._measure(label, change, contrast, low, bound, now)
         found = whole(label, mask, mask & (off | (share < 0)), now, ground)
-        if found is None or found[2]:
-            return replace(view, whole=found and view) if part else None
-        all_ = self._measure(found[0], change, found[1] - ground, low, bound, now)
+        if found is None:
+            return view if part else None
+        label, colours, plain = found
+        if plain:
+            return replace(view, whole=view) if part else None
+        all_ = self._measure(label, change, colours - ground, low, bound, now)
         return replace(view if part else replace(all_, area=0.0), whole=all_)
 
     def _measure(
@@ -363,9 +366,9 @@ def whole(
 ) -> tuple[Bools, Floats32, bool] | None:
     """All that differs from the background in one piece with what has the target's colour, `own`.
 
-    Not all that `differs` has an `other` colour: what lies between ground and target is its blur.
-    -> where it is (h, w); its colours (h, w, 3), continued to its edge; has it hardly another one?
-    None if it is not one compact thing.
+    Where that is, (h, w), its colours (h, w, 3), continued to its edge, and whether there is hardly
+    another colour; None if it is not one compact thing. Not all that `differs` has an `other`
+    colour: what lies between ground and target is its blur.
     """
     shadow = shadowed(now, ground, _UNEVEN)
     mask = (own | (differs & ~shadow)).astype(np.uint8)
