@@ -346,6 +346,7 @@ def _moved(before: _Relief, after: _Relief) -> bool | None:
 def _widespread(points: Floats, shape: Sequence[int]) -> bool:
     """Are points spread over an image (height, width)? Those of one large thing are not."""
     image = np.linalg.norm(shape) / np.sqrt(12)
+    # Times the image's own spread, that of corners that tell the camera's motion at least.
     return bool(np.sqrt(points.var(axis=0).sum()) > 0.6 * image)
 
 
@@ -386,7 +387,7 @@ def _by_corners(
     ends, found = _follow(before.fine, after.fine, points, guess)
     a, b = points[found], ends[found]
     best, good = _similar(a, b, 2 * _EXACT)
-    if best is None or good.sum() < max(20, _AGREE * len(a)):
+    if best is None or good.sum() < max(20, _AGREE * len(a)):  # fewer are not worth a look
         return None, False
     if good.sum() >= _MANY:
         full, obey = cv2.findHomography(a, b, cv2.RANSAC, _EXACT)
@@ -394,6 +395,7 @@ def _by_corners(
             best, good = np.asarray(full, float), obey[:, 0] > 0
     miss = np.linalg.norm(carry(best, a[good]) - b[good], axis=1)
     error = float(np.sqrt(np.mean(miss**2) * 4 / len(miss)))
+    # Reduced pixels: corners that tell a map no better need another witness, too.
     return Aligned(best, error), len(miss) >= _MANY and error < 0.05
 
 

@@ -59,7 +59,7 @@ def training_frame(rng: np.random.Generator, pool: Image) -> tuple[LabelledFrame
         image_size=(SIDE, SIDE),
     )
     centre = rng.uniform(-0.5, SIDE - 0.5, 2)
-    if rng.random() < 0.15:
+    if rng.random() < 0.15:  # without a target
         centre = np.full(2, np.nan)
     elif occluders and rng.random() < 0.5:  # near an edge of an occluder, where it is hard
         box = np.array(occluders[-1])
@@ -219,6 +219,7 @@ def train(
         torch.manual_seed(seed)
         network = Network().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     optimiser = torch.optim.AdamW(network.parameters(), weight_decay=1e-3)
+    # The largest learning rate, to which it rises over a twentieth of the steps.
     schedule = lr_scheduler.OneCycleLR(optimiser, 3e-3, steps + 1, pct_start=0.05)
     pool = background_pool(np.random.default_rng(seed))
     losses: list[float] = []
