@@ -605,6 +605,8 @@ def test_half_a_file_is_told(tmp_path, name, codec, sound):
     assert video_info(tmp_path / name).frames == pytest.approx(60, abs=1)
     told = track(tmp_path / name).warnings
     assert any("frames can be read: it is cut off" in warning for warning in told)
+    with pytest.raises(ValueError, match="target: its frame must be one of .*, got 55"):
+        track(tmp_path / name, target=vl.Hint(frame=55, box=(55, 15, 20, 20)))
 
 
 # ---- frames of two instants: one of them is shown, whichever it is for all frames alike

@@ -135,12 +135,11 @@ def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
     `samples` are frames spread evenly over the film, see `sample_frames`.
     """
     film = Film.of(frames, samples)
-    shape = frames.info.size, len(film.maps), film.factor
-    seed = None if hint is None else hint.boxed(*shape)
     n, boxes = len(film.maps), None
     for _ in range(4):  # of a target that covers its own ground, until the ground is without it
         seen, lights = sighted(film, boxes)
         n = min(n, len(lights))
+        seed = None if hint is None else hint.boxed(frames.info.size, n, film.factor)
         paths = _paths(seen, hint, seed)
         if not paths and seed is None:
             return nothing(film.motion, n)
