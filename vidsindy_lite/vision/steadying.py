@@ -40,27 +40,22 @@ _AGREE = 0.25  # share of the corners that must do so: of those of mere noise, 0
 class Ground(NamedTuple):
     """One level of a view on which others are laid.
 
-    Its grey levels, by what each pixel changes with shift, turn, scale and light, (6, h, w), how
-    much each may tell, and its pixels from the middle.
+    Its grey levels, by what each pixel changes with shift, turn, scale and light, (6, h, w), and
+    how much each may tell.
     """
 
     grey: Floats32
     slopes: Floats32
     share: Floats32
-    u: Floats32
-    v: Floats32
 
     @classmethod
     def of(cls, grey: Floats32) -> Ground:
-        height, width = grey.shape
-        u = np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2)
-        v = (np.arange(height, dtype=np.float32) - np.float32((height - 1) / 2))[:, None]
-        slopes = _slopes(grey, u, v)
+        slopes = _slopes(grey)
         power = _by_blocks(slopes[0] ** 2 + slopes[1] ** 2)
         # Times what a usual block tells, that one block may tell at most.
         fair = np.minimum(1, 4.0 * np.median(power) / np.maximum(power, 1e-9))
-        share = cv2.resize(fair, (width, height), interpolation=cv2.INTER_LINEAR)
-        return cls(grey, slopes, np.asarray(share, np.float32), u, v)
+        share = cv2.resize(fair, grey.shape[::-1], interpolation=cv2.INTER_LINEAR)
+        return cls(grey, slopes, np.asarray(share, np.float32))
 
 
 class Aligned(NamedTuple):
@@ -131,7 +126,7 @@ def _fit(
     ground: Ground, view: Floats32, here: Floats, scale: float, loose: float
 ) -> Aligned | None:
     """One level: Gauss-Newton steps of which each refines the map by what the key's slopes say."""
-    key, slopes, share, u, v = ground
+    key, slopes, share = ground
     height, width = key.shape
     middle = np.array([[1, 0, (width - 1) / 2], [0, 1, (height - 1) / 2], [0, 0, 1.0]])
     to_middle = np.linalg.inv(middle)
@@ -173,7 +168,7 @@ def _fit(
     if loose:  # a finer level says how sure the map is
         return Aligned(here, np.inf)
     miss = miss - np.tensordot(delta.astype(np.float32), slopes, 1)
-    seen = _slopes(np.where(known, (shown - offset) / gain, key).astype(np.float32), u, v)
+    seen = _slopes(np.where(known, (shown - offset) / gain, key).astype(np.float32))
     # Noise has slopes, too, but not the same in both views.
     told = heavy @ seen.reshape(6, -1).T
     value, direction = np.linalg.eigh((told + told.T) / 2)
@@ -183,7 +178,7 @@ def _fit(
     # Share of the blocks that must tell: what few of them tell may move on its own.
     if telling.mean() <= np.sqrt(0.1 * (telling**2).mean()):
         return Aligned(here, np.inf)
-    return Aligned(here, _error(slopes, weight * miss / spread**2, information, (u, v)))
+    return Aligned(here, _error(slopes, weight * miss / spread**2, information))
 
 
 def _middle(values: Floats | Floats32) -> float:
@@ -200,15 +195,16 @@ def _by_blocks(values: Floats32) -> Floats32:
     return np.asarray(blocks, np.float32)
 
 
-def _slopes(view: Floats32, u: Floats32, v: Floats32) -> Floats32:
-    """By what each pixel changes with shift, turn, scale and light, (6, h, w)."""
+def _slopes(view: Floats32) -> Floats32:
+    """By what each pixel changes with shift, turn, scale about the middle, and light, (6, h, w)."""
+    height, width = view.shape
+    u = np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2)
+    v = (np.arange(height, dtype=np.float32) - np.float32((height - 1) / 2))[:, None]
     gu, gv = (0.5 * cv2.Sobel(view, cv2.CV_32F, *by, ksize=1) for by in ((1, 0), (0, 1)))
     return np.stack([gu, gv, gu * u + gv * v, gv * u - gu * v, view, np.ones_like(view)])
 
 
-def _error(
-    slopes: Floats32, pull: Floats32, information: Floats, at: tuple[Floats32, Floats32]
-) -> float:
+def _error(slopes: Floats32, pull: Floats32, information: Floats) -> float:
     """Standard error of the places of a map, if errors within a block may be the same.
 
     `pull` (h, w) of each pixel; what the pixels do not tell is known by the guess only.
@@ -222,7 +218,7 @@ def _error(
     covariance = np.linalg.inv(information)
     blockwise = covariance @ (sums @ sums.T) @ covariance
     variance = np.maximum(np.diag(blockwise), np.diag(covariance))
-    far = float(np.mean(at[0] ** 2) + np.mean(at[1] ** 2))
+    far = (pull.shape[0] ** 2 + pull.shape[1] ** 2 - 2) / 12  # mean square from the middle
     return float(np.sqrt((variance[0] + variance[1] + far * (variance[2] + variance[3])) / 2))
 
 
