@@ -40,7 +40,6 @@ class Phone:
     bitrate: int = 4_000_000
     image_size: tuple[int, int] = (640, 480)
     frames: int = 120
-    rest: bool = False
 
     @classmethod
     def random(cls, rng: np.random.Generator, **fixed) -> "Phone":
@@ -77,8 +76,6 @@ def path_of(phone: Phone, rng: np.random.Generator) -> tuple[np.ndarray, np.ndar
     centre = np.array([width, height]) / 2 - 0.5
     places = centre + np.clip(reach, 15, None) * np.sin(2 * np.pi * np.outer(t, pace) + phase)
     scale = phone.nearness ** np.sin(2 * np.pi * t * rng.uniform(0.5, 1) + rng.uniform(0, 6))
-    if phone.rest:
-        places = np.repeat(places[:1], len(t), axis=0)
     return places, scale
 
 

@@ -1,7 +1,5 @@
 """What may be the target, the best path through it, and its looks."""
 
-from itertools import product
-
 import cv2
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from vidsindy_lite.vision.candidates import (
     TOLD,
     Appearance,
     Candidates,
-    _with_neighbours,
     best_path,
     candidates,
     components,
@@ -57,17 +54,6 @@ def test_what_moves_before_ground_that_the_plate_does_not_know_differs_from_its_
         here = found.only(found.frame == k)
         apart = np.linalg.norm(here.centre - [14.5 + 12 * k, 59.5], axis=1)
         assert (here.quality[apart < 1] > 0.4).any()
-
-
-def test_neighbours_are_three_frames_before_and_after():
-    frames = [np.full((2, 2, 3), k, np.uint8) for k in range(8)]
-    beside = [
-        (int(frame[0, 0, 0]), [int(other[0, 0, 0]) for other, _ in others])
-        for frame, _, others in _with_neighbours(frames, EYES)
-    ]
-    assert beside == [
-        (0, [3]), (1, [4]), (2, [5]), (3, [0, 6]), (4, [1, 7]), (5, [2]), (6, [3]), (7, [4]),
-    ]  # fmt: skip
 
 
 def test_of_a_crowd_of_like_things_none_is_worth_much():
@@ -201,18 +187,6 @@ def test_no_candidates_are_no_path():
     assert plainest_paths(one_a_frame(np.zeros((0, 2)), [])) == []
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_of_short_paths_none_is_worth_more_than_the_best(seed):
-    """Of two steps a path has no motion yet but the first: dynamic programming is exact."""
-    rng = np.random.default_rng(seed)
-    seen = Candidates.joined(
-        one_a_frame(rng.uniform(0, 30, (2, 2)), rng.uniform(0.3, 0.9, 2)) for _ in range(3)
-    )
-    value = best_path(seen)[1]
-    for one, other in product(np.flatnonzero(seen.frame == 0), np.flatnonzero(seen.frame == 1)):
-        assert best_path(seen.only(np.array([one, other])))[1] <= value + 1e-12
-
-
 def test_paths_have_nothing_in_common_and_the_plainest_comes_first():
     plain = one_a_frame(CURVE, np.full(30, 0.9))
     other = one_a_frame(CURVE[:, ::-1] + [200, 0], np.full(30, 0.6))
@@ -282,8 +256,7 @@ def test_it_is_followed_both_ways_from_where_it_is_known(tmp_path):
     found = Candidates.of(5, np.eye(3), np.column_stack(
         [two, two - 8, np.full((2, 2), 17.0), np.full(2, 200.0), np.zeros((2, 6)), np.ones(2)]
     ))  # fmt: skip
-    looks = followed(frames, maps, found, (10, PLACES[10], np.array([17.0, 17])),
-                     np.full((N, 2), np.nan))  # fmt: skip
+    looks = followed(frames, maps, found, (10, PLACES[10], np.array([17.0, 17])))
     shown = ~np.isin(np.arange(N), hidden)
     assert np.linalg.norm(looks.box[shown, :2] - PLACES[shown], axis=1).max() < 1.5
     assert looks.fit[10] == 1

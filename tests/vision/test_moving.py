@@ -1,6 +1,5 @@
 """The tracker for films that people make: phone footage with known truth, hints, real clips."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import cv2
@@ -16,10 +15,10 @@ from vidsindy_lite.vision.moving import Film, expected, finished
 from vidsindy_lite.vision.refining import View, fitting, joined, scatter
 from vidsindy_lite.vision.steadying import (
     CameraMotion,
-    Steadying,
     at_rest,
     carry,
     stands_still,
+    steadied,
 )
 from vidsindy_lite.vision.video import Reel
 
@@ -123,11 +122,8 @@ def test_the_camera_is_followed(camera):
     scene = cv2.GaussianBlur(rng.uniform(0, 255, (340, 420, 3)).astype(np.float32), (0, 0), 2)
     scene = np.clip(128 + 6 * (scene - 128), 0, 255)
     move = np.array([[1, 0, -50], [0, 1, -50], [0, 0, 1.0]])
-    steadying = Steadying(1)
     views = [cv2.warpPerspective(scene, m @ move, (320, 240)).astype(np.uint8) for m in maps]
-    for view in views:
-        steadying.add(view)
-    motion = steadying.motion()
+    motion = steadied(views, 1)
     points = np.array([[40, 40], [280, 40], [40, 200], [280, 200.0]])
     for here, true in zip(motion.maps, maps, strict=True):
         assert np.abs(carry(here, carry(true, points)) - points).max() < 0.5
@@ -163,19 +159,6 @@ def test_a_target_is_expected_on_its_way_between_its_sightings_and_three_frames_
     np.testing.assert_allclose(ways.box[near, 2:], [[12, 6]] * near.sum())
 
 
-def test_a_target_is_expected_in_frames_of_the_film_only():
-    last = followed_to(n=16)
-    np.testing.assert_array_equal(np.isfinite(last.centre[:, 0]), np.arange(16) >= 3)
-    first = followed_to(at=(1, 2, 3, 4, 5))
-    np.testing.assert_array_equal(np.isfinite(first.centre[:, 0]), np.arange(30) <= 8)
-
-
-def test_a_path_of_two_sightings_is_carried_on_in_a_line():
-    before, first, last, after = followed_to(at=(6, 8)).centre[4:11:2]
-    np.testing.assert_allclose(before, 2 * first - last)
-    np.testing.assert_allclose(after, 2 * last - first)
-
-
 def test_a_target_is_expected_where_the_camera_sees_it_in_whole_frames():
     plain = followed_to()
     k = np.arange(30)
@@ -191,13 +174,6 @@ def test_a_target_is_expected_where_the_camera_sees_it_in_whole_frames():
     np.testing.assert_allclose(whole.box[near], 3 * plain.box[near])
 
 
-def test_the_colour_that_is_expected_is_half_that_of_the_path_and_half_the_nearest():
-    # It is (50, 80, 20) in its first frame, 6, then (90, 80, 20).
-    colour = followed_to().colour
-    np.testing.assert_allclose(colour[[0, 3, 6, 7, 14, 29], 0], [90, 70, 70, 90, 90, 90])
-    np.testing.assert_allclose(colour[:, 1:], [[80, 20]] * 30)
-
-
 def test_a_film_knows_which_of_its_frames_are_its_samples(tmp_path, monkeypatch):
     ground = np.full((48, 64, 3), 100, np.uint8)
     frames = Reel(write_video(tmp_path / "clip.mov", [ground] * 41))
@@ -208,16 +184,6 @@ def test_a_film_knows_which_of_its_frames_are_its_samples(tmp_path, monkeypatch)
     monkeypatch.setattr(moving, "camera_motion", lambda *_: (at_rest(36), True))
     film = Film.of(frames, samples)
     np.testing.assert_array_equal(film.sampled, np.minimum(np.arange(0, 41, 2), 35))
-
-
-def test_partial_views_and_jumps_are_left_out():
-    frames = np.arange(40)
-    places = np.column_stack([3.0 * frames, 50 + 20 * np.sin(frames / 6)])
-    areas = np.full(40, 100.0)
-    areas[10] = 40
-    places[25] += 15
-    good = fitting(frames, places, areas, np.arange(40) != 5)
-    np.testing.assert_array_equal(np.flatnonzero(~good), [5, 10, 25])
 
 
 @pytest.mark.parametrize("end", [np.s_[:2], np.s_[-2:]])
@@ -288,15 +254,21 @@ def test_views_of_the_target_and_something_like_it_in_one_are_left_out():
     assert not joined(areas).any()
 
 
+def along(n, areas=100.0, half=5.0, **looks):
+    """Views of a square that travels to the right, all clear of the border."""
+    square = half * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+    places = np.column_stack([4 * half + 3.0 * np.arange(n), np.full(n, 10 * half)])
+    return [
+        View(place, area, np.zeros(3), True, place + square, **looks)
+        for place, area in zip(places, np.full(n, areas), strict=True)
+    ]
+
+
 def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
-    square = np.array([[-5.0, -5], [5, -5], [5, 5], [-5, 5]])
-    places = [np.array([20.0 + 3 * k, 50]) for k in range(20)]
-    views = [View(place, 100.0, np.zeros(3), True, place + square) for place in places]
-    errors = np.zeros(20)
-    maps = np.tile(np.eye(3), (20, 1, 1))
+    views, errors, maps = along(20), np.zeros(20), np.tile(np.eye(3), (20, 1, 1))
     assert finished(views, CameraMotion(maps, errors), ()).warnings == ()
-    larger = [replace(view, area=300.0) for view in views[12:]]
-    (doubt,) = finished(views[:12] + larger, CameraMotion(maps, errors), ()).warnings
+    larger = along(20, np.where(np.arange(20) < 12, 100.0, 300.0))
+    (doubt,) = finished(larger, CameraMotion(maps, errors), ()).warnings
     assert doubt.startswith("from frame 12 on, what is followed has another size at once")
     errors[16:] = np.inf
     found = finished(views, CameraMotion(maps, errors), ())
@@ -308,37 +280,22 @@ def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
 
 @pytest.mark.parametrize(("part", "told"), [(0.99, False), (0.8, True)])
 def test_an_outline_that_changes_from_frame_to_frame_is_told(part, told):
-    square = np.array([[-50.0, -50], [50, -50], [50, 50], [-50, 50]])
-    places = [np.array([90.0 + 3 * k, 90]) for k in range(40)]
     areas = 1e4 * np.where(np.random.default_rng(0).random(40) < 0.5, part, 1)
-    views = [
-        View(place, area, np.zeros(3), True, place + square)
-        for place, area in zip(places, areas, strict=True)
-    ]
-    found = finished(views, at_rest(40), ())
+    found = finished(along(40, areas, 50.0), at_rest(40), ())
     assert any("outline of the target" in doubt for doubt in found.warnings) == told
     assert (np.median(found.confidence) < np.exp(-2 / 3)) == told
 
 
-def test_views_before_ground_of_the_targets_colour_are_left_out_unless_all_are():
-    square = np.array([[-5.0, -5], [5, -5], [5, 5], [-5, 5]])
-    places = [np.array([20.0 + 3 * k, 50]) for k in range(20)]
-    maps = np.tile(np.eye(3), (20, 1, 1))
-    for faint in (8, 20):
-        views = [
-            View(place, 100.0, np.zeros(3), True, place + square, faint=k < faint)
-            for k, place in enumerate(places)
-        ]
-        seen = np.isfinite(finished(views, CameraMotion(maps, np.zeros(20)), ()).pixels[:, 0])
-        np.testing.assert_array_equal(seen, (np.arange(20) >= faint) | (faint == 20))
+@pytest.mark.parametrize("faint", [8, 20])
+def test_views_before_ground_of_the_targets_colour_are_left_out_unless_all_are(faint):
+    views = along(20, faint=True)[:faint] + along(20)[faint:]
+    seen = np.isfinite(finished(views, at_rest(20), ()).pixels[:, 0])
+    np.testing.assert_array_equal(seen, (np.arange(20) >= faint) | (faint == 20))
 
 
 @pytest.mark.parametrize(("seen", "found"), [(9, False), (11, True)])
 def test_a_target_is_seen_in_a_twentieth_of_the_frames_at_least(seen, found):
-    square = np.array([[-5.0, -5], [5, -5], [5, 5], [-5, 5]])
-    places = [np.array([20.0 + 3 * k, 50]) for k in range(seen)]
-    views = [View(place, 100.0, np.zeros(3), True, place + square) for place in places]
-    followed = finished(views + [None] * (200 - seen), at_rest(200), ())
+    followed = finished(along(seen) + [None] * (200 - seen), at_rest(200), ())
     assert np.isfinite(followed.pixels[:, 0]).sum() == found * seen
 
 

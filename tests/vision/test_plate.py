@@ -8,7 +8,6 @@ import pytest
 
 from vidsindy_lite.vision.plate import (
     Plate,
-    _masked_median,
     least_difference,
     lights_of,
     noise_of,
@@ -50,16 +49,6 @@ def panned(u, v, size=(48, 36)):
     return Plate(samples, maps, np.ones(21, bool))
 
 
-def test_a_plate_reaches_as_far_as_all_frames_but_the_outermost_do():
-    # From the second of 21 to the last but one: 54 pixels more than a frame, and 36.
-    plate = panned(3, -2)
-    assert plate.image.shape == (36 + 36, 48 + 54, 3)
-    np.testing.assert_array_equal(plate.shift @ [3, -38, 1], [0, 0, 1])
-    # In its corners it is shown by less than three frames.
-    assert plate.valid[40, 50] == 255
-    assert plate.valid[0, 0] == plate.valid[-1, -1] == 0
-
-
 @pytest.mark.parametrize("pan", [(20, 0), (0, -15)])
 def test_a_plate_of_a_camera_that_turns_far_shows_what_is_around_the_middle_of_its_way(pan):
     plate = panned(*pan)
@@ -70,27 +59,6 @@ def test_a_plate_of_a_camera_that_turns_far_shows_what_is_around_the_middle_of_i
     middle = 10 * np.array(pan) + [23.5, 17.5]
     found = (np.array(size) - 1) / 2 - plate.shift[:2, 2]
     np.testing.assert_allclose(found, middle, atol=1)
-
-
-def test_a_median_is_that_of_the_samples_that_show_a_place():
-    rng = np.random.default_rng(0)
-    samples = list(rng.integers(0, 256, (7, 150, 40, 3), np.uint8))
-    moves = [np.array([[1, 0, 5 * k], [0, 1, 11 * k % 6], [0, 0, 1.0]]) for k in range(7)]
-    median, count = _masked_median(
-        samples,
-        [np.full((150, 40), 255, np.uint8)] * 7,
-        moves,
-        np.ones((7, 3), np.float32),
-        (74, 157),
-    )
-    canvas = np.full((7, 157, 74, 3), np.nan)
-    for k, sample in enumerate(samples):
-        canvas[k, 11 * k % 6 :][:150, 5 * k : 5 * k + 40] = sample
-    shown = np.isfinite(canvas[..., 0]).sum(axis=0)
-    np.testing.assert_array_equal(count, shown)
-    odd = shown % 2 == 1  # else the upper or the lower of the two in the middle
-    assert odd.mean() > 0.3
-    np.testing.assert_array_equal(median[odd], np.nanmedian(canvas[:, odd], axis=0))
 
 
 def test_the_plate_of_a_moving_camera():

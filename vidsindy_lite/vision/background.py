@@ -30,7 +30,6 @@ from scipy.spatial.distance import cdist
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .video import Reel, reduce
 
-_SATURATED = 250  # 255, but for compression
 LONGEST = 480  # pixels of the longer side of a reduced frame
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
 STRIP = 64  # rows of an image that are sorted at once: what they need stays in the cache
@@ -83,7 +82,7 @@ def changes(frame: Image, ground: Image, factor: Floats32) -> Floats32:
     """
     then = relit(ground, factor)
     if factor.min() < 1:
-        np.maximum(then, frame, out=then, where=ground >= _SATURATED)
+        np.maximum(then, frame, out=then, where=ground >= 250)  # 255, but for compression
     return np.asarray(frame - (np.minimum(then, 255) if factor.max() > 1 else then), np.float32)
 
 
@@ -188,15 +187,15 @@ def _others(changes: list[Floats32], floor: float) -> float:
     return float(np.mean(found)) if found else 0.0
 
 
-def camera_motion(background: Floats32, changes: list[Floats32], floor: float) -> Floats:
-    """Pixels by which the whole background is displaced in each sample, 0 where that is not sure.
+def displacement(background: Floats32, changes: list[Floats32], floor: float) -> float:
+    """Pixels by which the whole background is displaced in a sample at most, as far as is sure.
 
     To first order a displacement changes the image by minus that times its slope: least squares,
     with a prior of one coarse pixel where there is little to see.
     """
     slope = np.array(np.gradient(background, axis=(1, 0))).reshape(2, -1)
-    displaced = np.zeros(len(changes))
-    for k, change in enumerate(changes):
+    farthest = 0.0
+    for change in changes:
         calm = lengths(change) <= floor
         if not calm.any():
             continue
@@ -205,11 +204,10 @@ def camera_motion(background: Floats32, changes: list[Floats32], floor: float) -
         # Grey levels squared; variance of coarse differences without any noise.
         variance = d[use].var() + 0.05
         information = g @ g.T / variance + np.eye(2)
-        displacement = np.linalg.solve(information, g @ d / variance)
-        error = np.sqrt(np.trace(np.linalg.inv(information)))
-        distance = float(np.linalg.norm(displacement))
-        displaced[k] = _COARSE * distance if distance > 5 * error else 0.0
-    return displaced
+        distance = float(np.linalg.norm(np.linalg.solve(information, g @ d / variance)))
+        if distance > 5 * np.sqrt(np.trace(np.linalg.inv(information))):
+            farthest = max(farthest, _COARSE * distance)
+    return farthest
 
 
 def light(frame: Image | Floats32, background: Image | Floats32, known: Bools) -> Floats32:
@@ -231,13 +229,13 @@ def light(frame: Image | Floats32, background: Image | Floats32, known: Bools) -
 
 
 def _unrest(
-    background: Floats32, changes: list[Floats32], displaced: Floats, floor: float
+    background: Floats32, changes: list[Floats32], displaced: float, floor: float
 ) -> tuple[str, ...]:
     """Why a background model is not the right one: what is not at rest in the samples."""
     doubts = []
-    if displaced.size and displaced.max() > _SHAKY:
+    if displaced > _SHAKY:
         doubts.append(
-            f"the camera moves, by up to {displaced.max():.1f} px in the sampled frames; "
+            f"the camera moves, by up to {displaced:.1f} px in the sampled frames; "
             "its motion is part of the track"
         )
     everywhere = np.ones(background.shape[:2], bool)
@@ -290,8 +288,8 @@ class BackgroundModel:
         self.size = np.array(self.background.shape[1::-1])
         self.coarse_background = reduce(self.background, _COARSE).astype(np.float32)
         changes = [one - self.coarse_background for one in coarse]
-        displaced = camera_motion(self.coarse_background, changes, self.coarse_floor)
-        self.camera_rests = bool(displaced.max(initial=0.0) <= _SHAKY)
+        displaced = displacement(self.coarse_background, changes, self.coarse_floor)
+        self.camera_rests = displaced <= _SHAKY
         self.unrest = _unrest(self.coarse_background, changes, displaced, self.coarse_floor)
         # The difference is smoothed over about the width of the ring: noise falls to a quarter.
         # Grey levels; above this noise the difference is smoothed before it is thresholded.

@@ -17,8 +17,7 @@ though.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
@@ -32,7 +31,6 @@ from .steadying import (
     Aligned,
     CameraMotion,
     Ground,
-    Steadying,
     align,
     at_rest,
     carry,
@@ -41,12 +39,10 @@ from .steadying import (
     pyramid,
     rescaled,
     stands_still,
+    steadied,
 )
 from .video import Reel
 
-_FAINT = 0.1  # grey levels; a difference without any noise
-_RIM = np.ones((9, 9), np.uint8)  # around what is not known, where smoothing is wrong
-_EDGE = np.ones((5, 5), np.uint8)  # around what a plate does not show
 LOOSE = 1.0  # pixels (reduced ones if it is to be used at all) to which a camera's motion is known
 
 
@@ -98,7 +94,8 @@ def _misses(frame: Image, ground: Image, known: Bools) -> Floats32:
     smooth = cv2.GaussianBlur(change, (0, 0), 2.0)
     # Grey levels that a pixel can differ by: a few that differ by more say no more.
     apart = np.minimum(lengths(np.asarray(smooth, np.float32)), 20.0)
-    use = cv2.erode(known.astype(np.uint8), _RIM).astype(np.float32)
+    # Around what is not known smoothing is wrong.
+    use = cv2.erode(known.astype(np.uint8), np.ones((9, 9))).astype(np.float32)
     parts, share = (
         cv2.resize(x, (PARTS, PARTS), interpolation=cv2.INTER_AREA) for x in (apart * use, use)
     )
@@ -114,7 +111,8 @@ def _gain(one: Floats32, other: Floats32) -> float:
     both = np.isfinite(one) & np.isfinite(other)
     if not both.any():
         return 0.0
-    ratios = np.sort(np.log((other[both] + _FAINT) / (one[both] + _FAINT)))
+    # Grey levels; a difference without any noise.
+    ratios = np.sort(np.log((other[both] + 0.1) / (one[both] + 0.1)))
     aside = int(0.2 * len(ratios))  # the share of the parts that what moves on its own may be in
     return float(ratios[aside : len(ratios) - aside].mean())
 
@@ -152,7 +150,7 @@ def _limited(level: Ground, where: Bools) -> Ground:
     """A level that tells nothing outside some part (h, w) of the image."""
     size = level.grey.shape[1::-1]
     share = cv2.resize(where.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    inner = cv2.erode(np.asarray(share > 0.99, np.uint8), _EDGE) > 0
+    inner = cv2.erode(np.asarray(share > 0.99, np.uint8), np.ones((5, 5))) > 0
     return level._replace(share=level.share * inner)
 
 
@@ -194,10 +192,9 @@ def _motion(ground: list[Ground], frames: Reel, larger: float) -> CameraMotion:
     """All frames laid on the ground, and so on the first; errors are `larger` than they tell."""
     laid = [_laid(ground, pyramid(frame), np.eye(3)) for frame in frames]
     maps, errors = _maps(laid), np.array([one.error for one in laid])
-    steady = rescaled(np.linalg.inv(maps[0]) @ maps, 1 / frames.factor)
     sure = larger * np.hypot(errors, errors[0])
     sure[0] = 0.0
-    return CameraMotion(steady / steady[:, 2:, 2:], frames.factor * sure)
+    return CameraMotion.of(np.linalg.inv(maps[0]) @ maps, sure, frames.factor)
 
 
 def camera_motion(frames: Reel, small: Image, sampled: Ints) -> tuple[CameraMotion, bool]:
@@ -209,34 +206,20 @@ def camera_motion(frames: Reel, small: Image, sampled: Ints) -> tuple[CameraMoti
     still = stands_still(small)
     if still is True:
         return at_rest(frames.info.frames), True
-    ways: list[Callable[[], CameraMotion | None]] = [partial(trembling, frames, small)]
-    if still is False:
-        ways.insert(0, partial(_steadied, frames, small, sampled))
-    found: list[CameraMotion] = []
-    for way in ways:
-        if (motion := way()) is not None:
-            found.append(motion)
-            if _usual_error(motion) < LOOSE:
-                break
-    if found:
-        return min(found, key=_usual_error), True
-    return at_rest(frames.info.frames), rests(small)
+    motion = None if still is None else _followed(frames, small, sampled)
+    if motion is None or np.median(motion.errors) >= LOOSE:
+        found = [one for one in (motion, trembling(frames, small)) if one is not None]
+        motion = min(found, key=lambda one: np.median(one.errors), default=None)
+    return (at_rest(frames.info.frames), rests(small)) if motion is None else (motion, True)
 
 
-def _usual_error(motion: CameraMotion) -> float:
-    return float(np.median(motion.errors))
-
-
-def _steadied(frames: Reel, small: Image, sampled: Ints) -> CameraMotion | None:
+def _followed(frames: Reel, small: Image, sampled: Ints) -> CameraMotion | None:
     """Frames laid on each other, one after the other.
 
     None if these maps say no more than their errors: then they only add these. None, too, if the
     frames fit together worse by them than at rest.
     """
-    steadying = Steadying(frames.factor)
-    for frame in frames:
-        steadying.add(frame)
-    motion = steadying.motion()
+    motion = steadied(frames, frames.factor)
     if not _plainly(motion, frames.info.size, frames.factor):
         return None
     at = np.minimum(sampled, len(motion.maps) - 1)

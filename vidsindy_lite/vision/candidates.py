@@ -23,9 +23,8 @@ time near where its motion leads and near the candidates there.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterable, Iterator
-from itertools import chain, repeat
+from itertools import chain, islice, repeat, tee
 from typing import Any, NamedTuple, Self
 
 import cv2
@@ -38,8 +37,6 @@ from .plate import Plate, least_difference, tolerance
 from .steadying import carry
 from .video import Reel
 
-_LEVELS = 1.0, 2.5, 6.0  # tolerances by which what is connected differs
-_APART = 3  # frames to the neighbours with which a frame is compared
 _KEPT = 16  # candidates of a frame
 GAP = 15  # frames that a path may miss
 TOLD = 20.0  # quality of a candidate that somebody points at
@@ -96,32 +93,20 @@ def candidates(
     """The candidates of all frames, and how much brighter each frame is than the ground."""
     lights, found = [], []
     bound = tolerance(plate.image, least_difference(noise), moves=plate.moves)
-    if plate.moves:
-        bound[plate.valid == 0] = 1e3
+    bound[plate.valid == 0] = 1e3
     for i, (frame, here, others) in enumerate(_with_neighbours(frames, maps)):
-        height, width = frame.shape[:2]
         ground, known = plate.seen_from(here)
-        allowed = bound
-        if plate.moves:
-            back = np.linalg.inv(plate.shift @ here)
-            there = cv2.warpPerspective(bound, back, (width, height), borderValue=1e3)
-            allowed = np.asarray(there, np.float32)
+        allowed = plate.laid(bound, here)
         lit = light(frame, ground, known)
         lights.append(lit)
         differs = lengths(changes(frame, ground, lit))
-        if plate.unsure is not None:  # a guess says nothing of what is within its error
-            unsure = plate.unsure
-            if plate.moves:
-                there = cv2.warpPerspective(unsure, back, (width, height))
-                unsure = np.asarray(there, np.float32)
-            differs = np.maximum(differs - unsure, 0)
-        strengths = [differs / allowed * known]
+        witnesses = [(differs / allowed * known, 1.0)]
         if others:
-            strengths.append(_from_neighbours(frame, others, plate.moves) / allowed)
+            witnesses.append((_from_neighbours(frame, others, plate.moves) / allowed, 0.7))
         rows = [
             components(strength, level, frame, ground, worth)
-            for strength, worth in zip(strengths, (1.0, 0.7), strict=False)
-            for level in _LEVELS
+            for strength, worth in witnesses
+            for level in (1.0, 2.5, 6.0)  # tolerances by which what is connected differs
         ]
         found.append(Candidates.of(i, here, _distinct(np.concatenate(rows))))
         found[-1].colour[:] /= lit
@@ -134,14 +119,13 @@ def _with_neighbours(
     frames: Iterable[Image], maps: Floats
 ) -> Iterator[tuple[Image, Floats, list[tuple[Image, Floats]]]]:
     """Each frame and its map, and some frames before and after it with maps that lay them on it."""
-    window: deque[tuple[Image, Floats] | None] = deque([None] * _APART, maxlen=2 * _APART + 1)
-    for one in chain(zip(frames, maps, strict=False), repeat(None, _APART)):
-        window.append(one)
-        if len(window) <= _APART or (middle := window[-1 - _APART]) is None:
-            continue
-        back = np.linalg.inv(middle[1])
-        beside = [window[0] if len(window) > 2 * _APART else None, window[-1]]
-        yield *middle, [(other[0], back @ other[1]) for other in beside if other is not None]
+    apart = 3  # frames to the neighbours with which a frame is compared
+    first, middles, last = tee(zip(frames, maps, strict=False), 3)
+    before = chain(repeat(None, apart), first)
+    after = chain(islice(last, apart, None), repeat(None))
+    for (frame, here), *beside in zip(middles, before, after, strict=False):
+        back = np.linalg.inv(here)
+        yield frame, here, [(one[0], back @ one[1]) for one in beside if one is not None]
 
 
 def _from_neighbours(frame: Image, others: list[tuple[Image, Floats]], moves: bool) -> Floats32:
@@ -434,9 +418,8 @@ def _top(values: Floats) -> float:
 
 
 def followed(
-    frames: Reel, maps: Floats, found: Candidates, seed: tuple[int, Floats, Floats],
-    guide: Floats,
-) -> Looks:  # fmt: skip
+    frames: Reel, maps: Floats, found: Candidates, seed: tuple[int, Floats, Floats]
+) -> Looks:
     """Follow a target by its looks, both ways.
 
     Parameters
@@ -448,27 +431,24 @@ def followed(
     found : Candidates
     seed : int, ndarray, ndarray
         A frame in which the target is known, its centre and size there, in reduced pixels.
-    guide : ndarray, shape (n, 2)
-        Where a path leads; NaN where none does.
     """
     n = len(maps)
     factor = frames.factor if frames.whole.few else 1
     box, fit = np.full((n, 4), np.nan), np.zeros(n)
     like = np.ones(len(found.frame))  # of what is not looked at, nothing is said
     bounds = np.searchsorted(found.frame, np.arange(n + 1))
+    first, middle, size = seed
+    box[first], fit[first] = [*middle, *size], 1.0
     for way in (1, -1):
-        looks: Appearance | None = None
-        last: list[tuple[int, Floats]] = []
         size, usual = seed[2].astype(float), 1.0
-        for i, frame in _in_order(frames, seed[0], way, n):
+        last = [(first, carry(maps[first], middle[None])[0])]
+        for i, frame in _in_order(frames, first, way, n):
             here = np.s_[bounds[i] : bounds[i + 1]]
-            if looks is None:
-                looks = Appearance(frame, seed[1], size, factor)
-                box[i], fit[i] = [*seed[1], *size], 1.0
-                last = [(i, carry(maps[i], seed[1][None])[0])]
-                like[here] = _likeness(looks, frame[::factor, ::factor], found.box[here])
-                continue
+            if i == first:
+                looks = Appearance(frame, middle, size, factor)
             like[here] = _likeness(looks, frame[::factor, ::factor], found.box[here])
+            if i == first:
+                continue
             gap = abs(i - last[-1][0])
             speed = np.zeros(2)
             if len(last) > 1:
@@ -476,7 +456,7 @@ def followed(
             ahead = carry(np.linalg.inv(maps[i]), (last[-1][1] + speed * min(gap, 8))[None])[0]
             near = _near(found.only(here), like[here], ahead, size, gap)
             tries: list[Floats] = []
-            for one in [ahead, *near] if np.isnan(guide[i, 0]) else [ahead, guide[i], *near]:
+            for one in [ahead, *near]:
                 if not any(np.linalg.norm(one - other) < size.min() / 4 for other in tries):
                     tries.append(one)
             best = -np.inf, ahead, 0.0, 0.0, False
@@ -493,7 +473,7 @@ def followed(
             # What differs from the ground and has its colours may be blurred or turned.
             sure = answer > max(0.12, 0.35 * usual) or (moved and colour > 0.5)
             if not (inside and sure):
-                if gap > 60 and np.isnan(guide[i, 0]):
+                if gap > 60:
                     break
                 continue
             usual = 0.95 * usual + 0.05 * answer

@@ -25,9 +25,7 @@ LEAST = 0.4
 """Smallest confidence of a detection. Detectors of this family are modest: the package's own gives
 0.44 to 0.9 to whole targets, more the smaller they are, and less than 0.3 to what is none."""
 
-_AGREE = 0.25  # of the target's size: distance within which predictions speak of one target
 _WEAK = 0.5  # of the largest confidence: below, a prediction is not averaged
-_GREY = 114  # of the margins of an image that has another aspect ratio than the model's input
 
 Predictions = Floats32
 """Centre (u, v), width, height and confidence of each anchor, shape (5, n)."""
@@ -123,7 +121,7 @@ class OnnxDetector:
         left, top = (self.width - size[0]) // 2, (self.height - size[1]) // 2
         margins = (top, self.height - size[1] - top, left, self.width - size[0] - left)
         resized = cv2.resize(image, size, interpolation=cv2.INTER_LINEAR)
-        padded = cv2.copyMakeBorder(resized, *margins, cv2.BORDER_CONSTANT, value=(_GREY,) * 3)
+        padded = cv2.copyMakeBorder(resized, *margins, cv2.BORDER_CONSTANT, value=(114,) * 3)
         self.network.setInput(cv2.dnn.blobFromImage(padded, 1 / 255))
         found = np.asarray(self.network.forward(), np.float32)
         if found.ndim != 3 or len(found) != 1 or found.shape[1] < 5:
@@ -174,7 +172,8 @@ def detections(predictions: Predictions, least: float = LEAST, most: int = 3) ->
         if best[4] < least:
             break
         apart = np.hypot(*(predictions[:2] - best[:2, None])) / best[2:4].mean()
-        agree = (apart <= _AGREE) & (predictions[4] >= _WEAK * best[4])
+        # Of its size: the distance within which predictions speak of one target.
+        agree = (apart <= 0.25) & (predictions[4] >= _WEAK * best[4])
         weight = predictions[4, agree]
         mean = np.average(predictions[:4, agree].astype(float), axis=1, weights=weight)
         found.append(Detection(mean[:2], mean[2:], float(best[4])))

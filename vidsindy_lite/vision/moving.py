@@ -39,7 +39,6 @@ from .steadying import CameraMotion, at_rest, carry, rescaled
 from .video import Reel, reduce
 
 _SHORTEST = 5  # frames of a path
-_ROUGH = 0.5  # confidence in a target that is not seen whole: it is known to about two pixels
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,14 +135,11 @@ def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
     `samples` are frames spread evenly over the film, see `sample_frames`.
     """
     film = Film.of(frames, samples)
-    shape = frames.info.size, len(film.maps), film.factor
-    seed = None if hint is None else hint.boxed(*shape)
     n, boxes = len(film.maps), None
     for _ in range(4):  # of a target that covers its own ground, until the ground is without it
         seen, lights = sighted(film, boxes)
         n = min(n, len(lights))
-        if seed is not None and boxes is None:
-            seed = _tightened(seen, seed)
+        seed = None if hint is None else hint.boxed(frames.info.size, n, film.factor)
         paths = _paths(seen, hint, seed)
         if not paths and seed is None:
             return nothing(film.motion, n)
@@ -157,10 +153,8 @@ def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
         boxes = covered
     if seed is None and boxes is not None and _turns_only(seen, rows):
         return nothing(film.motion, n)
-    guide = np.full((n, 2), np.nan)
-    guide[seen.frame[rows]] = seen.centre[rows]
     start = seed or _plainest(seen, rows)
-    looks = followed(frames, film.maps[:n], seen, start, guide)
+    looks = followed(frames, film.maps[:n], seen, start)
     both = _together(seen, looks, film.maps, start[0], told=seed is not None)
     rows, _ = best_path(both)
     if len(rows) < _SHORTEST:
@@ -204,18 +198,6 @@ def _paths(
         liked = seen._replace(quality=seen.quality * hint.likeness(seen.colour, seen.behind))
     # Of less, noise is made.
     return [path for path in plainest_paths(liked) if np.median(seen.quality[path.rows]) > 0.2]
-
-
-def _tightened(seen: Candidates, seed: tuple[int, Floats, Floats]) -> tuple[int, Floats, Floats]:
-    """A box that is drawn loosely around one plain thing, close around it."""
-    frame, centre, size = seed
-    here = (seen.frame == frame) & (np.abs(seen.centre - centre) < size / 4).all(axis=1)
-    inside = np.flatnonzero(here & (seen.box[:, 2:] < size).all(axis=1) & (seen.quality > 0.8))
-    if not len(inside):
-        return seed
-    best = inside[seen.area[inside].argmax()]
-    loose = seen.area[best] < 0.4 * 0.7 * size.prod()
-    return (frame, seen.centre[best], np.maximum(seen.box[best, 2:], 4)) if loose else seed
 
 
 def _plainest(seen: Candidates, rows: Ints) -> tuple[int, Floats, Floats]:
@@ -285,8 +267,8 @@ def _together(
     at = np.flatnonzero(np.isfinite(looks.box[:, 0]))
     box, area = looks.box[at], 0.7 * looks.box[at, 2:].prod(axis=1)
     centre, worth = box[:, :2], np.clip(1.2 * looks.fit[at], 0.25, 0.8)
-    colour, behind = (np.tile(np.median(x, axis=0), (len(at), 1)) if len(x) else
-                      np.zeros((len(at), 3)) for x in (seen.colour, seen.behind))  # fmt: skip
+    colour = np.zeros((len(at), 3))
+    colour[:] = np.median(seen.colour, axis=0) if len(seen.colour) else 0
     bounds = np.searchsorted(seen.frame, np.arange(len(maps) + 1))
     for k, i in enumerate(at.tolist()):
         here = np.arange(bounds[i], bounds[i + 1])
@@ -295,12 +277,12 @@ def _together(
                     & (np.abs(np.log(seen.area[here] / area[k])) < 0.8)]  # fmt: skip
         if len(near):
             best = near[quality[near].argmax()]
-            colour[k], behind[k] = seen.colour[best], seen.behind[best]
+            colour[k] = seen.colour[best]
             worth[k] += 0.5 * quality[best]
             quality[near] += 0.5 * looks.fit[i]
     place = carry(maps[at], centre)
     alike = Candidates(at, place, centre, np.column_stack([centre - box[:, 2:] / 2, box[:, 2:]]),
-                       area, colour, behind, worth)  # fmt: skip
+                       area, colour, colour, worth)  # fmt: skip
     alike.quality[at == first] += TOLD
     kept = (seen.frame != first) | (not told)
     return Candidates.joined([seen._replace(quality=quality).only(kept), alike])
@@ -321,13 +303,11 @@ def lens_of(samples: Image, film: Film, *ways: Ways) -> Lens:
 
 def viewed(film: Film, lens: Lens, ways: Ways, lights: list[Floats32]) -> list[View | None]:
     """The target in whole frames, near where it is expected."""
-    views = []
-    for i, (frame, here) in enumerate(zip(film.frames.whole, film.motion.maps, strict=False)):
-        view = None
-        if i < len(ways.centre) and np.isfinite(ways.centre[i, 0]):
-            view = lens.look(frame, here, ways.box[i], ways.centre[i], ways.colour[i], lights[i])
-        views.append(view)
-    return views
+    shown = zip(film.frames.whole, film.motion.maps, *ways, lights, strict=False)
+    return [
+        lens.look(frame, here, box, centre, colour, light) if np.isfinite(centre[0]) else None
+        for frame, here, centre, box, colour, light in shown
+    ]
 
 
 def nothing(motion: CameraMotion, n: int) -> Track:
@@ -369,8 +349,7 @@ def expected(seen: Candidates, rows: Ints, film: Film, n: int) -> Ways:
     for outside, end in ((frames < at[0], slice(0, 4)), (frames > at[-1], slice(-4, None))):
         if outside.any():
             fit = np.polyfit(at[end] - at[end][0], place[end], min(2, len(at[end]) - 1))
-            t = frames[outside] - at[end][0]
-            along[outside] = np.column_stack([np.polyval(fit[:, k], t) for k in (0, 1)])
+            along[outside] = np.vander(frames[outside] - at[end][0], len(fit)) @ fit
     extent = np.column_stack([np.interp(frames, at, x) for x in seen.box[rows, 2:].T])
     centre, box, colour = np.full((n, 2), np.nan), np.full((n, 4), np.nan), np.zeros((n, 3))
     centre[frames] = carry(np.linalg.inv(film.maps[frames]), along)
@@ -435,9 +414,9 @@ def _filled(
     Where only a part of it shows, its motion is surer, if that is known; else the looks, which are
     off by the same as in the frames around.
     """
-    n = len(found.pixels)
+    n, k = len(found.pixels), film.factor
     pixels, confidence = found.pixels.copy(), found.confidence.copy()
-    k = film.factor
+    rough = 0.5  # confidence in a target that is not seen whole: it is known to about two pixels
     alike = carry(film.motion.maps[:n], k * looks.box[:, :2] + (k - 1) / 2)
     side = k * np.sqrt(looks.box[:, 2:].prod(axis=1))
     expects = carry(film.motion.maps[:n], ways.centre)
@@ -456,12 +435,12 @@ def _filled(
         size, view = ways.box[i, 2:].mean(), views[i]
         beside = np.concatenate([at[at < i][-4:], at[at > i][:4]])
         if len(beside) == 8 and np.ptp(beside) < 40:
-            way, rough = (_curve(beside - i, pixels[beside], degree) for degree in (3, 2))
-            known = np.linalg.norm(way - rough) < (0.25 * size if told else min(0.25 * size, 2))
+            way, other = (np.polyfit(beside - i, pixels[beside], degree)[-1] for degree in (3, 2))
+            known = np.linalg.norm(way - other) < (0.25 * size if told else min(0.25 * size, 2))
             there = carry(film.motion.maps[i], view.centroid[None])[0] if view else np.inf
             part = np.linalg.norm(there - way) < 0.75 * size
             if known and (part or (on[i] and looks.fit[i] > 0.5 * usual)):
-                pixels[i], confidence[i] = way, _ROUGH
+                pixels[i], confidence[i] = way, rough
                 continue
         if not told and view is not None:  # what hides a part of it draws its looks aside
             continue
@@ -471,14 +450,8 @@ def _filled(
         near = at[np.argsort(np.abs(at - i), kind="stable")[:15]]
         near = near[on[near]]
         shift = np.median((found.pixels - alike)[near], axis=0) if len(near) > 2 else 0
-        pixels[i], confidence[i] = alike[i] + shift, _ROUGH
+        pixels[i], confidence[i] = alike[i] + shift, rough
     if not len(at) and np.isfinite(pixels[:, 0]).any():
         looks_only = "no view tells it from its ground: it is followed by its looks alone"
         return replace(found, pixels=pixels, confidence=confidence, warnings=(looks_only,))
     return replace(found, pixels=pixels, confidence=confidence)
-
-
-def _curve(frames: Ints, places: Floats, degree: int) -> Floats:
-    """Where a polynomial of the time through places (m, 2) is at the time 0."""
-    powers = np.vander(frames / 10, degree + 1)
-    return np.asarray(np.linalg.lstsq(powers, places)[0][-1])

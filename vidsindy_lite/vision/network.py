@@ -14,10 +14,6 @@ from ..arrays import Image
 STRIDE = 4  # pixels between two anchors
 COARSEST = 16  # pixels, of which the sides of an image are multiples
 
-_WIDTHS = (16, 16, 32, 64)  # channels at strides 2, 4, 8, 16; multiples of 16 run fastest
-_TYPICAL = 16.0  # pixels; a size of exp(0)
-_RARE = 0.01  # confidence of an untrained network: targets are rare among anchors
-
 
 class _Conv(nn.Sequential):
     """Convolution, batch normalisation, SiLU: the brick of the family."""
@@ -55,7 +51,8 @@ class Network(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        stem, fine, middle, coarse = _WIDTHS
+        # Channels at strides 2, 4, 8, 16; multiples of 16 run fastest.
+        stem, fine, middle, coarse = 16, 16, 32, 64
         self.stem = _Conv(3, stem, stride=2)
         self.fine = nn.Sequential(_Conv(stem, fine, stride=2), _Split(fine, fine))
         self.middle = nn.Sequential(_Conv(fine, middle, stride=2), _Split(middle, middle))
@@ -64,8 +61,8 @@ class Network(nn.Module):
         self.up_fine = _Split(middle + fine, fine)
         self.what = nn.Sequential(_Conv(fine, fine), nn.Conv2d(fine, 1, 1))
         self.where = nn.Sequential(_Conv(fine, fine), nn.Conv2d(fine, 4, 1))
-        bias = self.what[-1].get_parameter("bias")
-        nn.init.constant_(bias, float(np.log(_RARE / (1 - _RARE))))
+        # Targets are rare among anchors: an untrained network's confidence is 0.01.
+        nn.init.constant_(self.what[-1].get_parameter("bias"), float(np.log(0.01 / 0.99)))
 
     def forward(self, images: torch.Tensor) -> torch.Tensor:
         """Predictions, the confidence before the sigmoid.
@@ -88,7 +85,8 @@ class Network(nn.Module):
         up = self.up_fine(torch.cat([up, fine], dim=1))
         where, what = self.where(up).flatten(2), self.what(up).flatten(2)
         centre = anchors(*up.shape[2:]).T + STRIDE * where[:, :2]
-        return torch.cat([centre, _TYPICAL * where[:, 2:].exp(), what], dim=1)
+        # Pixels; a size of exp(0).
+        return torch.cat([centre, 16.0 * where[:, 2:].exp(), what], dim=1)
 
 
 def anchors(rows: int, columns: int) -> torch.Tensor:

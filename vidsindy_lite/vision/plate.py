@@ -16,8 +16,6 @@ from ..arrays import Bools, Floats, Floats32, Image
 from .background import STRIP, changes, light, median_image
 from .steadying import carry
 
-_SHOWN = 3  # samples that must show a place of the plate
-
 
 class Plate:
     """The steadied background, of frames of one size.
@@ -47,7 +45,6 @@ class Plate:
         self.size = size
         self.moves = not np.allclose(maps, np.eye(3))
         self.shift = np.eye(3)
-        self.unsure: Floats32 | None = None
         if lights is None:
             lights = np.ones((len(samples), 3), np.float32)
         if not self.moves and hidden is None and (lights == 1).all():
@@ -76,15 +73,13 @@ class Plate:
         self.image, count = _masked_median(
             shown, [shows[i] for i in use], moves, np.reciprocal(lights[use]), (width, height)
         )
-        self.valid = np.where(count >= _SHOWN, 255, 0).astype(np.uint8)
+        # Samples that must show a place of the plate.
+        self.valid = np.where(count >= 3, 255, 0).astype(np.uint8)
         if hidden is not None:
             self._continue([shows[i] for i in use], moves, count)
 
     def _continue(self, shows: Sequence[Image], moves: Sequence[Floats], count: Image) -> None:
-        """Ground that the target hides is what is seen of it, or what is around it.
-
-        Such a guess is as unsure as what is around it varies.
-        """
+        """Ground that the target hides is what is seen of it, or what is around it."""
         size = self.image.shape[1::-1]
         covered = np.zeros(self.valid.shape, np.uint8)
         for one, move in zip(shows, moves, strict=True):
@@ -95,12 +90,16 @@ class Plate:
         left, top, width, height = cv2.boundingRect(never)
         if width:
             window = np.s_[max(top - 8, 0) : top + height + 8, max(left - 8, 0) : left + width + 8]
-            known = (never[window] == 0) & (self.valid[window] > 0)
-            spread = np.sqrt(self.image[window][known].var(axis=0).sum()) if known.any() else 0.0
-            self.unsure = np.float32(spread) * never
             self.image[window] = cv2.inpaint(
                 self.image[window], never[window], 3, cv2.INPAINT_TELEA
             )
+
+    def laid(self, image: Floats32, here: Floats) -> Floats32:
+        """An image over the plate, as the frame that the map carries sees it; 1000 beyond it."""
+        if not self.moves:
+            return image
+        back, size = np.linalg.inv(self.shift @ here), self.size.tolist()
+        return np.asarray(cv2.warpPerspective(image, back, size, borderValue=1e3), np.float32)
 
     def seen_from(
         self, here: Floats, low: Floats | None = None, high: Floats | None = None, step: int = 1

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -27,9 +26,7 @@ from .plate import Plate, least_difference, tolerance
 
 _CELLS = 32  # into which the side of a target is cut
 _REACH = 1.5  # sides of the target from its middle that its usual outline may have
-_TOUCHING = np.ones((7, 7), np.uint8)  # cells around a place that is missed: its edge is there
 _UNEVEN = 0.12  # share by which a shadow may darken the colours of a pixel unlike each other
-_FAINT, _RIM = 2.0, 0.9  # tolerances by which a ground differs from the target; share of its rim
 _WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
 _AROUND = 9  # views around one that say how large it should be
 _MOSTLY = 0.8  # share of the views that must show it whole
@@ -75,7 +72,8 @@ def hidden(
         patch, window = _drawn((centre + 0.9 * reach - low) / cell)
         missed[window] += patch & unseen[window]
     # Views that miss the target in a place where it is hidden.
-    never = np.asarray(cv2.dilate((missed >= 2).astype(np.uint8), _TOUCHING), np.uint8)
+    # Their edges are within three cells of it.
+    never = np.asarray(cv2.dilate((missed >= 2).astype(np.uint8), np.ones((7, 7))), np.uint8)
     found = np.zeros(len(centres), bool)
     for i, (outline, centre, reach) in enumerate(zip(outlines, centres, usual, strict=True)):
         for reached in (outline, centre + reach):
@@ -178,10 +176,12 @@ class Lens:
             return None
         view = self._measure(label, change, contrast, low, bound, now)
         found = whole(label, mask, mask & (off | (share < 0)), now, ground)
-        if found is None or found.plain:
-            return replace(view, whole=found and view) if part else None
-        contrast = found.colours - ground
-        all_ = self._measure(found.label, change, contrast, low, bound, now)
+        if found is None:
+            return view if part else None
+        label, colours, plain = found
+        if plain:
+            return replace(view, whole=view) if part else None
+        all_ = self._measure(label, change, colours - ground, low, bound, now)
         return replace(view if part else replace(all_, area=0.0), whole=all_)
 
     def _measure(
@@ -205,8 +205,9 @@ class Lens:
         first = low + [columns[0], rows[0]]
         last = low + [columns[-1], rows[-1]]
         inside = bool((first > 0).all() and (last < self.plate.size - 1).all())
-        alike = square[rim] < (_FAINT * bound[rim]) ** 2
-        faint = bool(alike.any() and alike.mean() > _RIM)
+        # Nearly all of the ground around it differs from it by less than two tolerances.
+        alike = square[rim] < (2 * bound[rim]) ** 2
+        faint = bool(alike.any() and alike.mean() > 0.9)
         shade = now[core if core.any() else label].mean(axis=0)
         outline = low + hull(label).astype(float)
         return View(low + centroid, area, shade, inside, outline, faint=faint)
@@ -360,24 +361,14 @@ def scatter(frames: Ints, places: Floats) -> float:
     return float(1.4826 * np.median(np.abs(fourth)) / np.sqrt(70))
 
 
-class Whole(NamedTuple):
-    """All that differs from the background in one piece with what has the target's colour.
-
-    `label` (h, w) is where; `colours` (h, w, 3) are those inside it, continued to its edge; `plain`
-    is whether there is hardly another colour.
-    """
-
-    label: Bools
-    colours: Floats32
-    plain: bool
-
-
 def whole(
     own: Bools, differs: Bools, other: Bools, now: Floats32, ground: Floats32
-) -> Whole | None:
-    """The whole of which `own` is a part, None if it is not one compact thing.
+) -> tuple[Bools, Floats32, bool] | None:
+    """All that differs from the background in one piece with what has the target's colour, `own`.
 
-    Not all that `differs` has an `other` colour: what lies between ground and target is its blur.
+    Where that is, (h, w), its colours (h, w, 3), continued to its edge, and whether there is hardly
+    another colour; None if it is not one compact thing. Not all that `differs` has an `other`
+    colour: what lies between ground and target is its blur.
     """
     shadow = shadowed(now, ground, _UNEVEN)
     mask = (own | (differs & ~shadow)).astype(np.uint8)
@@ -394,4 +385,4 @@ def whole(
     colours = np.zeros((1 + np.count_nonzero(core), 3), np.float32)
     colours[nearest[core]] = now[core]
     plain = (label & other & ~shadow).sum() < 0.15 * label.sum()
-    return Whole(label, colours[nearest], bool(plain))
+    return label, colours[nearest], bool(plain)

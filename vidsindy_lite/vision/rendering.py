@@ -315,21 +315,17 @@ class Scene:
 def _check_rectangles(name: str, rectangles: Iterable[Box], size: Size) -> tuple[Box, ...]:
     """Boxes of whole pixels that lie in the image."""
     try:
-        boxes: tuple[Any, ...] = tuple(tuple(rectangle) for rectangle in rectangles)
-        whole = all(len(box) == 4 and all(x == int(x) for x in box) for box in boxes)
+        given = [tuple(box) for box in rectangles]
+        boxes = np.array(given, float).reshape(len(given), 4)
     except MALFORMED:
-        whole = False
-    if not whole:
-        raise ValueError(f"{name}: must be boxes of four whole pixels, got {shown(rectangles)}")
-    for rectangle in boxes:
-        if min(rectangle[:2]) < 0 or min(rectangle[2:]) < 4:
-            raise ValueError(
-                f"{name}: each must be whole pixels (left >= 0, top >= 0, width >= 4, "
-                f"height >= 4), got {rectangle}"
-            )
-        if rectangle[0] + rectangle[2] > size[0] or rectangle[1] + rectangle[3] > size[1]:
-            raise ValueError(f"{name}: must lie in the {size} image, got {rectangle}")
-    return boxes
+        boxes = np.full((1, 4), np.nan)
+    inside = (boxes >= [0, 0, 4, 4]).all() and (boxes[:, :2] + boxes[:, 2:] <= size).all()
+    if not inside or (boxes % 1 != 0).any():
+        raise ValueError(
+            f"{name}: must be boxes of four whole pixels (left >= 0, top >= 0, width >= 4, "
+            f"height >= 4) that lie in the {size} image, got {shown(rectangles)}"
+        )
+    return tuple(map(tuple, boxes.astype(int).tolist()))
 
 
 def coverage(polygon: Floats) -> tuple[Floats, Ints]:

@@ -26,45 +26,36 @@ from ..arrays import Bools, Floats, Floats32, Image, Ints
 
 _RIM = 2  # pixels of each level that depend on what lies beyond the image
 _BEYOND = -1e6  # in place of grey levels where nothing is shown: what it has a part in is below 0
-_LOOSE, _FIRM = 40.0, 3.0  # grey levels, and deviations, from which on a pixel is left aside
-_STEP, _TURN = 8.0, 0.03  # pixels and radians by which the guess may be wrong
+_STEP = 8.0  # pixels by which the guess may be wrong
 PARTS = 12  # into which each side of an image is cut: of one corner, and of one error, each
 _WIDTH = 21  # reduced pixels: what is smoother than this is light
-_CONTRAST, _DARK = 250.0, 20.0  # of the relief; grey levels below which all is dark
 _EXACT = 1.0  # reduced pixels by which a corner may miss its place
 _STILL = 0.25  # reduced pixels by which a corner at rest may seem to move
 _VAGUE = 3.0  # reduced pixels: a map that is known no better is not known
 PLAINLY = 10.0  # standard errors of a displacement that is one
-_FEWEST = 8  # corners for a map of four numbers: shift, turn and scale
-_SOME, _MANY = 20, 60  # corners that are worth a look; that need no other witness
+_MANY = 60  # corners that need no other witness
 _AGREE = 0.25  # share of the corners that must do so: of those of mere noise, 0.15 to 0.24 agree
-_WIDE = 0.6  # times the image's own spread, that of corners that tell the camera's motion at least
 
 
 class Ground(NamedTuple):
     """One level of a view on which others are laid.
 
-    Its grey levels, by what each pixel changes with shift, turn, scale and light, (6, h, w), how
-    much each may tell, and its pixels from the middle.
+    Its grey levels, by what each pixel changes with shift, turn, scale and light, (6, h, w), and
+    how much each may tell.
     """
 
     grey: Floats32
     slopes: Floats32
     share: Floats32
-    u: Floats32
-    v: Floats32
 
     @classmethod
     def of(cls, grey: Floats32) -> Ground:
-        height, width = grey.shape
-        u = np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2)
-        v = (np.arange(height, dtype=np.float32) - np.float32((height - 1) / 2))[:, None]
-        slopes = _slopes(grey, u, v)
+        slopes = _slopes(grey)
         power = _by_blocks(slopes[0] ** 2 + slopes[1] ** 2)
         # Times what a usual block tells, that one block may tell at most.
         fair = np.minimum(1, 4.0 * np.median(power) / np.maximum(power, 1e-9))
-        share = cv2.resize(fair, (width, height), interpolation=cv2.INTER_LINEAR)
-        return cls(grey, slopes, np.asarray(share, np.float32), u, v)
+        share = cv2.resize(fair, grey.shape[::-1], interpolation=cv2.INTER_LINEAR)
+        return cls(grey, slopes, np.asarray(share, np.float32))
 
 
 class Aligned(NamedTuple):
@@ -106,7 +97,9 @@ def align(before: list[Ground], after: list[Floats32], guess: Floats) -> Aligned
     for level in range(len(before), 0, -1):
         scale, back = (np.diag([x, x, 1.0]) for x in (0.5**level, 2.0**level))
         here = scale @ found @ back
-        fitted = _fit(before[level - 1], after[level - 1], here, scale[0, 0], _LOOSE * (level > 1))
+        # Grey levels from which on a pixel is left aside.
+        loose = 40.0 if level > 1 else 0.0
+        fitted = _fit(before[level - 1], after[level - 1], here, scale[0, 0], loose)
         if fitted is None:
             return None
         found = back @ fitted.map @ scale
@@ -121,24 +114,25 @@ def _as_similarity(guess: Floats, size: Ints) -> Floats:
 
     Other parts of it, as perspective, would stay as they are, since nothing is fitted to them.
     """
-    u, v = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]).T * size[:, None]
-    zero, one = np.zeros(4), np.ones(4)
-    ends = guess @ [u, v, one]
-    rows = np.concatenate([np.column_stack([u, -v, one, zero]), np.column_stack([v, u, zero, one])])
-    c, s, right, down = np.linalg.lstsq(rows, (ends[:2] / ends[2]).ravel())[0]
-    return np.array([[c, -s, right], [s, c, down], [0, 0, 1]])
+    corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * size.astype(float)
+    # As complex numbers, places are turned, scaled and shifted by a line.
+    turn, shift = np.polyfit(corners @ [1, 1j], carry(guess, corners) @ [1, 1j], 1)
+    return np.array(
+        [[turn.real, -turn.imag, shift.real], [turn.imag, turn.real, shift.imag], [0, 0, 1]]
+    )
 
 
 def _fit(
     ground: Ground, view: Floats32, here: Floats, scale: float, loose: float
 ) -> Aligned | None:
     """One level: Gauss-Newton steps of which each refines the map by what the key's slopes say."""
-    key, slopes, share, u, v = ground
+    key, slopes, share = ground
     height, width = key.shape
     middle = np.array([[1, 0, (width - 1) / 2], [0, 1, (height - 1) / 2], [0, 0, 1.0]])
     to_middle = np.linalg.inv(middle)
     steep = slopes.reshape(6, -1)
-    sure = np.array([_STEP, _STEP, _TURN, _TURN, 1, 100]) * [scale, scale, 1, 1, 1, 1]
+    # What the guess may be wrong by: shift, turn and scale, gain and offset of the light.
+    sure = np.array([scale * _STEP, scale * _STEP, 0.03, 0.03, 1, 100])
     prior = np.diag(1 / sure**2)
     gain, offset = 1.0, 0.0
     framed = np.full_like(view, _BEYOND)
@@ -158,7 +152,7 @@ def _fit(
             miss -= offset
         # Grey levels; a deviation without any noise.
         spread = max(1.4826 * _middle(np.abs(miss[known])), 0.3)
-        bound = max(_FIRM * spread, loose / 2**step)
+        bound = max(3 * spread, loose / 2**step)
         weight = share * known / (1 + (miss / bound) ** 2) ** 2
         heavy = steep * weight.ravel()
         normal = heavy @ steep.T + spread**2 * prior
@@ -174,7 +168,7 @@ def _fit(
     if loose:  # a finer level says how sure the map is
         return Aligned(here, np.inf)
     miss = miss - np.tensordot(delta.astype(np.float32), slopes, 1)
-    seen = _slopes(np.where(known, (shown - offset) / gain, key).astype(np.float32), u, v)
+    seen = _slopes(np.where(known, (shown - offset) / gain, key).astype(np.float32))
     # Noise has slopes, too, but not the same in both views.
     told = heavy @ seen.reshape(6, -1).T
     value, direction = np.linalg.eigh((told + told.T) / 2)
@@ -184,7 +178,7 @@ def _fit(
     # Share of the blocks that must tell: what few of them tell may move on its own.
     if telling.mean() <= np.sqrt(0.1 * (telling**2).mean()):
         return Aligned(here, np.inf)
-    return Aligned(here, _error(slopes, weight * miss / spread**2, information, (u, v)))
+    return Aligned(here, _error(slopes, weight * miss / spread**2, information))
 
 
 def _middle(values: Floats | Floats32) -> float:
@@ -201,15 +195,16 @@ def _by_blocks(values: Floats32) -> Floats32:
     return np.asarray(blocks, np.float32)
 
 
-def _slopes(view: Floats32, u: Floats32, v: Floats32) -> Floats32:
-    """By what each pixel changes with shift, turn, scale and light, (6, h, w)."""
+def _slopes(view: Floats32) -> Floats32:
+    """By what each pixel changes with shift, turn, scale about the middle, and light, (6, h, w)."""
+    height, width = view.shape
+    u = np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2)
+    v = (np.arange(height, dtype=np.float32) - np.float32((height - 1) / 2))[:, None]
     gu, gv = (0.5 * cv2.Sobel(view, cv2.CV_32F, *by, ksize=1) for by in ((1, 0), (0, 1)))
     return np.stack([gu, gv, gu * u + gv * v, gv * u - gu * v, view, np.ones_like(view)])
 
 
-def _error(
-    slopes: Floats32, pull: Floats32, information: Floats, at: tuple[Floats32, Floats32]
-) -> float:
+def _error(slopes: Floats32, pull: Floats32, information: Floats) -> float:
     """Standard error of the places of a map, if errors within a block may be the same.
 
     `pull` (h, w) of each pixel; what the pixels do not tell is known by the guess only.
@@ -223,7 +218,7 @@ def _error(
     covariance = np.linalg.inv(information)
     blockwise = covariance @ (sums @ sums.T) @ covariance
     variance = np.maximum(np.diag(blockwise), np.diag(covariance))
-    far = float(np.mean(at[0] ** 2) + np.mean(at[1] ** 2))
+    far = (pull.shape[0] ** 2 + pull.shape[1] ** 2 - 2) / 12  # mean square from the middle
     return float(np.sqrt((variance[0] + variance[1] + far * (variance[2] + variance[3])) / 2))
 
 
@@ -236,6 +231,12 @@ class CameraMotion(NamedTuple):
 
     maps: Floats
     errors: Floats
+
+    @classmethod
+    def of(cls, maps: Floats, errors: Floats, factor: int) -> CameraMotion:
+        """By maps of frames that are reduced by a factor, and errors in their pixels."""
+        larger = rescaled(maps, 1 / factor)
+        return cls(larger / larger[:, 2:, 2:], factor * errors)
 
     @property
     def moves(self) -> bool:
@@ -271,8 +272,8 @@ class _Relief(NamedTuple):
         grey = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32)
         grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), 1))
         mean = cv2.blur(cv2.blur(grey, (_WIDTH, _WIDTH)), (_WIDTH, _WIDTH))
-        fine = np.clip(128 + _CONTRAST * (grey - mean) / (mean + _DARK), 0, 255).astype(np.uint8)
-        return cls(fine, pyramid(small))
+        fine = np.clip(128 + 250 * (grey - mean) / (mean + 20), 0, 255)  # below 20, all is dark
+        return cls(fine.astype(np.uint8), pyramid(small))
 
 
 def _corners(grey: Image) -> Floats:
@@ -341,7 +342,8 @@ def _moved(before: _Relief, after: _Relief) -> bool | None:
 def _widespread(points: Floats, shape: Sequence[int]) -> bool:
     """Are points spread over an image (height, width)? Those of one large thing are not."""
     image = np.linalg.norm(shape) / np.sqrt(12)
-    return bool(np.sqrt(points.var(axis=0).sum()) > _WIDE * image)
+    # Times the image's own spread, that of corners that tell the camera's motion at least.
+    return bool(np.sqrt(points.var(axis=0).sum()) > 0.6 * image)
 
 
 def _drifted(before: _Relief, after: _Relief) -> bool | None:
@@ -362,117 +364,99 @@ def displacement(maps: Floats, size: Sequence[int]) -> Floats:
 
 def _similar(a: Floats, b: Floats, exact: float) -> tuple[Floats | None, Bools]:
     """The shift, turn and scale that most corners share, and which do."""
-    if len(a) < _FEWEST:
-        return None, np.zeros(len(a), bool)
-    found, obey = cv2.estimateAffinePartial2D(a, b, ransacReprojThreshold=exact)
-    if found is None:
-        return None, np.zeros(len(a), bool)
-    return np.vstack([found, [0, 0, 1]]), obey[:, 0] > 0
+    # Corners for a map of four numbers.
+    if len(a) >= 8:
+        found, obey = cv2.estimateAffinePartial2D(a, b, ransacReprojThreshold=exact)
+        if found is not None:
+            return np.vstack([found, [0, 0, 1]]), obey[:, 0] > 0
+    return None, np.zeros(len(a), bool)
 
 
-class _ByCorners(NamedTuple):
-    """Where a frame lies in another, by its corners, and how many of them say so."""
+def _by_corners(
+    before: _Relief, points: Floats, after: _Relief, last: Floats
+) -> tuple[Aligned | None, bool]:
+    """Where a frame lies in another, by its corners, from a map that is about right.
 
-    found: Aligned | None
-    agreeing: int
-
-    @property
-    def alone(self) -> bool:
-        """Need they no other witness?"""
-        # Reduced pixels: corners that tell a map no better need another witness, too.
-        return self.found is not None and self.agreeing >= _MANY and self.found.error < 0.05
-
-
-def _by_corners(before: _Relief, points: Floats, after: _Relief, last: Floats) -> _ByCorners:
-    """Where a frame lies in another, by its corners, from a map that is about right."""
+    And whether they need no other witness: they are many, and tell the map exactly.
+    """
     guess = carry(last, points) if len(points) else points
     ends, found = _follow(before.fine, after.fine, points, guess)
     a, b = points[found], ends[found]
     best, good = _similar(a, b, 2 * _EXACT)
-    if best is None or good.sum() < max(_SOME, _AGREE * len(a)):
-        return _ByCorners(None, 0)
+    if best is None or good.sum() < max(20, _AGREE * len(a)):  # fewer are not worth a look
+        return None, False
     if good.sum() >= _MANY:
         full, obey = cv2.findHomography(a, b, cv2.RANSAC, _EXACT)
         if full is not None and obey.sum() >= max(_MANY, 0.8 * good.sum()):
             best, good = np.asarray(full, float), obey[:, 0] > 0
     miss = np.linalg.norm(carry(best, a[good]) - b[good], axis=1)
     error = float(np.sqrt(np.mean(miss**2) * 4 / len(miss)))
-    return _ByCorners(Aligned(best, error), len(miss))
+    # Reduced pixels: corners that tell a map no better need another witness, too.
+    return Aligned(best, error), len(miss) >= _MANY and error < 0.05
 
 
-class Steadying:
-    """Follows a camera through reduced frames, one at a time.
+class _Key(NamedTuple):
+    """A frame in which others are located, its corners, and where it lies in the first one."""
 
-    `factor` is by how much they are reduced.
-    """
+    relief: _Relief
+    points: Floats
+    grounds: list[Ground]
+    base: Floats
+    error: float
 
-    def __init__(self, factor: int) -> None:
-        self.factor = factor
-        self.key: _Relief | None = None
-        self.maps: list[Floats] = []
-        self.errors: list[float] = []
+    @classmethod
+    def of(cls, relief: _Relief, base: Floats, error: float) -> _Key:
+        return cls(relief, _corners(relief.fine), grounds(relief.levels), base, error)
 
-    def _start(self, relief: _Relief, base: Floats, error: float) -> None:
-        self.key, self.points, self.base, self.drift = relief, _corners(relief.fine), base, error
-        self.grounds: list[Ground] | None = None  # of the key frame, once they are needed
-        self.last = np.eye(3)  # from the key frame to the newest
+    def locate(self, relief: _Relief, last: Floats) -> Aligned | None:
+        """Where it lies in another, from a map that is about right.
 
-    def _locate(self, relief: _Relief) -> Aligned | None:
-        """Where the key frame lies in another: by corners; if these are few, perhaps by pixels."""
-        assert self.key is not None
-        told = _by_corners(self.key, self.points, relief, self.last)
-        if told.alone:
-            return told.found
-        if self.grounds is None:
-            self.grounds = grounds(self.key.levels)
-        direct = align(self.grounds, relief.levels, self.last)
-        both = [one for one in (told.found, direct) if one is not None and one.error < _VAGUE]
+        By corners; if these are few, perhaps by pixels.
+        """
+        told, alone = _by_corners(self.relief, self.points, relief, last)
+        if alone:
+            return told
+        direct = align(self.grounds, relief.levels, last)
+        both = [one for one in (told, direct) if one is not None and one.error < _VAGUE]
         best = min((one.error for one in both), default=0.0)
-        # Times the error of another map that is about as good.
+        # Times the error of another map that is about as good; then the smaller step is taken.
         good = [one for one in both if one.error <= 3.0 * best]
-        return min(good, key=lambda one: self._step(one.map), default=None)
+        size, back = self.relief.fine.shape[::-1], np.linalg.inv(last)
+        steps = [displacement((one.map @ back)[None], size)[0] for one in good]
+        return good[int(np.argmin(steps))] if good else None
 
-    def _step(self, here: Floats) -> float:
-        """By how much a map differs from that of the frame before, where two are as good."""
-        assert self.key is not None
-        step = here @ np.linalg.inv(self.last)
-        return float(displacement(step[None], self.key.fine.shape[::-1])[0])
-
-    def _shared(self, here: Floats) -> float:
-        """Share of the key frame that is still in view."""
-        assert self.key is not None
-        size = np.array(self.key.fine.shape[::-1])
+    def shared(self, here: Floats) -> float:
+        """Share of it that is in the view of the frame in which it lies here."""
+        size = np.array(self.relief.fine.shape[::-1])
         u, v = np.meshgrid(*np.outer(size, np.linspace(0, 1, 9)))
         places = carry(here, np.column_stack([u.ravel(), v.ravel()]))
         return float(((places >= 0) & (places < size)).all(axis=1).mean())
 
-    def add(self, small: Image) -> None:
-        """The next frame."""
-        relief = _Relief.of(small)
-        if self.key is None:
-            self.before = relief, np.eye(3), 0.0
-            self._start(*self.before)
-            self.maps.append(np.eye(3))
-            self.errors.append(0.0)
-            return
-        located = self._locate(relief)
+
+def steadied(frames: Iterable[Image], factor: int) -> CameraMotion:
+    """The motion of a camera, by frames reduced by a factor, one after the other."""
+    maps: list[Floats] = []
+    errors: list[float] = []
+    for relief in map(_Relief.of, frames):
+        if not maps:
+            before = relief, np.eye(3), 0.0
+            key, last = _Key.of(*before), np.eye(3)
+            maps, errors = [np.eye(3)], [0.0]
+            continue
+        located = key.locate(relief, last)
         if located is None:  # little in common with the key frame: more with the last one known
-            self._start(*self.before)
-            located = self._locate(relief)
+            key, last = _Key.of(*before), np.eye(3)
+            located = key.locate(relief, last)
         if located is None:
-            self.maps.append(self.maps[-1])
-            self.errors.append(np.inf)
-            return
-        self.last = located.map
-        self.maps.append(self.base @ np.linalg.inv(self.last))
-        self.errors.append(float(np.hypot(self.drift, located.error)))
-        self.before = relief, self.maps[-1], self.errors[-1]
+            maps.append(maps[-1])
+            errors.append(np.inf)
+            continue
+        last = located.map
+        before = relief, key.base @ np.linalg.inv(last), float(np.hypot(key.error, located.error))
+        maps.append(before[1])
+        errors.append(before[2])
         # Share of a key frame that is left, below which there must be a new one. Each adds its
         # error to all that follow, so late: a little above the 0.3 that `align` needs.
-        if self._shared(self.last) < 0.4:
-            self._start(*self.before)
-
-    def motion(self) -> CameraMotion:
-        """The motion so far, in pixels of the frames."""
-        maps = rescaled(np.array(self.maps), 1 / self.factor)
-        return CameraMotion(maps / maps[:, 2:, 2:], self.factor * np.array(self.errors))
+        if key.shared(last) < 0.4:
+            key, last = _Key.of(*before), np.eye(3)
+    return CameraMotion.of(np.array(maps), np.array(errors), factor)

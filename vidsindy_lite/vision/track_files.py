@@ -46,36 +46,28 @@ _BINARY = {
     ".mat": "MATLAB's", ".pickle": "a pickle", ".pkl": "a pickle", ".xlsx": "a spreadsheet",
     ".ods": "a spreadsheet", ".kva": "Kinovea's own", ".trk": "Tracker's own", ".npy": "an array",
 }  # fmt: skip
-_SURE = 0.6  # DeepLabCut's own limit of the likelihood
-_HEADS = ("scorer", "individuals", "bodyparts", "coords")  # of its rows, whatever stands in these
-_MOST_FRAMES = 10_000_000  # a larger number of a frame is none
 _POINT = re.compile(r"(.+)_cam(_?)(\d+)_([xy])")
 _OURS = re.compile(r"([uv])_?(\d+)")
 _TIME = re.compile(
     r"(?:t|times?|timestamp)(?:[ _(\[/]*(s|sec|seconds|ms|msec|us|µs|ns)[)\]]*)?|"
     r"(seconds|milliseconds|ms)"
 )
-_TICKS = {"ms": 1e-3, "msec": 1e-3, "milliseconds": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
-_LONG = 2.0  # units of time from one frame to the next that no camera takes, if these are seconds
 _FRAME = (
     "frame", "frames", "step", "n", "frame_idx", "frame_id", "frame_number", "frame_no", "frameid",
 )  # fmt: skip
 _PIXELS = (
-    ("u", "v"),
-    ("pixelx", "pixely"),
-    ("x", "y"),
-    ("x_px", "y_px"),
-    ("position_x", "position_y"),
-)
+    ("u", "v"), ("pixelx", "pixely"), ("x", "y"), ("x_px", "y_px"), ("position_x", "position_y"),
+)  # fmt: skip
 _WHOSE = ("track", "track_id", "particle", "id", "object_id", "tid", "individual")
 _CORNER = (("x", "y"), ("left", "top"), ("bb_left", "bb_top"), ("u", "v"), ("bbox_x", "bbox_y"))
 _WIDTH = (("w", "h"), ("width", "height"), ("bb_width", "bb_height"), ("bbox_w", "bbox_h"))
 _OPPOSITE = (
     ("x1", "y1", "x2", "y2"), ("xmin", "ymin", "xmax", "ymax"), ("left", "top", "right", "bottom"),
 )  # fmt: skip
-_UNSEEN = {"na", "n/a", "#n/a", "null", "none", "-", "--", "missing", "lost", "?"}
-_SEEN = ("visible", "visibility", "seen", "detected", "found", "valid")
-_HIDDEN = ("occluded", "lost", "missing", "outside", "invisible")
+_UNSEEN = {"", "na", "n/a", "#n/a", "null", "none", "-", "--", "missing", "lost", "?"}
+_SEEN = (
+    "visible", "visibility", "seen", "detected", "found", "valid", "score", "conf", "confidence",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,10 +125,9 @@ def read_tracks(path: str | os.PathLike, individual: str | None = None) -> list[
         chosen.
     """
     path = check_file("tracks", path)
-    if path.suffix.lower() in _BINARY:
+    if kind := _BINARY.get(path.suffix.lower()):
         raise ValueError(
-            f"tracks: must be a table as text, got '{path.name}', {_BINARY[path.suffix.lower()]}: "
-            "export it as CSV"
+            f"tracks: must be a table as text, got '{path.name}', {kind}: export it as CSV"
         )
     text = read_text("tracks", path, "a table of numbers", fallback="latin-1")
     with reading("tracks", path):
@@ -259,8 +250,8 @@ def _split(cells: list[list[str]]) -> tuple[list[list[str]], list[list[str]]]:
 
 def _is_of_numbers(row: Sequence[str]) -> bool:
     """Whether a line holds values: numbers or nothing, but for a name in front."""
-    if row and row[0].strip().lower() in _HEADS:
-        return False
+    if row and row[0].strip().lower() in ("scorer", "individuals", "bodyparts", "coords"):
+        return False  # of DeepLabCut, whatever stands in these
     rest = row[1:] if len(row) > 1 and _number(row[0]) is None else row
     numbers = [_number(cell) for cell in rest if cell.strip()]
     return None not in numbers and (bool(numbers) or rest is row)
@@ -268,7 +259,7 @@ def _is_of_numbers(row: Sequence[str]) -> bool:
 
 def _number(cell: str) -> float | None:
     try:
-        return float(cell) if cell.strip().lower() not in _UNSEEN | {""} else np.nan
+        return float(cell) if cell.strip().lower() not in _UNSEEN else np.nan
     except ValueError:
         return None
 
@@ -358,8 +349,8 @@ def _of_deeplabcut(
 
 def _of_cameras(name: str, columns: Mapping[str, Floats]) -> list[TrackFile]:
     """Our own table of all cameras."""
-    numbers = sorted({int(m[2]) for key in columns if (m := _OURS.fullmatch(key))})
     tidy = {key.replace("_", ""): values for key, values in columns.items()}
+    numbers = sorted({int(m[2]) for key in tidy if (m := _OURS.fullmatch(key))})
     try:
         return [
             _whole(f"{name}, camera {i}", tidy[f"u{i}"], tidy[f"v{i}"], columns) for i in numbers
@@ -371,14 +362,14 @@ def _of_cameras(name: str, columns: Mapping[str, Floats]) -> list[TrackFile]:
 def _of_columns(name: str, columns: Mapping[str, Floats], of_world: bool) -> TrackFile:
     """One camera's columns; those of the world of a program may have any origin and unit."""
     doubts: tuple[str, ...] = ()
-    corner = next((pair for pair in _CORNER if set(pair) <= columns.keys()), None)
-    size = next((pair for pair in _WIDTH if set(pair) <= columns.keys()), None)
-    corners = next((four for four in _OPPOSITE if set(four) <= columns.keys()), None)
-    pair = next((pair for pair in _PIXELS if set(pair) <= columns.keys()), None)
-    box = corner + size if corner and size else corners
+    sized = [corner + size for corner in _CORNER for size in _WIDTH]
+    box, pair = (
+        next((keys for keys in known if set(keys) <= columns.keys()), None)
+        for known in ((*sized, *_OPPOSITE), _PIXELS)
+    )
     if box:
         low, high = (np.array([columns[key] for key in keys]) for keys in (box[:2], box[2:]))
-        sides = high if box != corners else high - low
+        sides = high if box in sized else high - low
         # Edges of the first pixel are at -0.5 and 0.5; a box without an area is none.
         u, v = np.where((sides > 0).all(axis=0), low + sides / 2 - 0.5, np.nan)
         doubts += (f"{name}: the middles of its boxes are taken, of {', '.join(box)}",)
@@ -410,10 +401,10 @@ def _seen(columns: Mapping[str, Floats]) -> Bools:
     seen = np.ones(len(next(iter(columns.values()))), bool)
     for key, values in columns.items():
         if key == "likelihood":
-            seen &= values >= _SURE
-        elif key in _SEEN or key in ("score", "conf", "confidence"):
+            seen &= values >= 0.6  # DeepLabCut's own limit
+        elif key in _SEEN:
             seen &= ~(values <= 0)
-        elif key in _HIDDEN:
+        elif key in ("occluded", "lost", "missing", "outside", "invisible"):
             seen &= ~(values > 0)
     return seen
 
@@ -431,7 +422,9 @@ def _whole(
     t, frames = None, next((columns[key] for key in _FRAME if key in columns), None)
     if clock is not None:
         match = _TIME.fullmatch(clock)
-        t = columns[clock] * _TICKS.get((match and (match[1] or match[2])) or "", 1.0)
+        unit = (match and (match[1] or match[2])) or "s"
+        # Seconds in milli-, micro- or nanoseconds, by their first letter.
+        t = columns[clock] * {"m": 1e-3, "u": 1e-6, "µ": 1e-6, "n": 1e-9}.get(unit[0], 1.0)
     pixels = np.column_stack((u, v))
     # What many programs write where nothing was found.
     unset = (pixels[:, 0] == pixels[:, 1]) & (pixels[:, 0] <= 0) & (pixels[:, 0] % 1 == 0)
@@ -445,9 +438,10 @@ def _whole(
         if t is None:
             raise ValueError("must have increasing whole numbers of frames")
         frames = None
-    if t is not None and len(t) > 1 and np.median(np.diff(t)) > _LONG:
+    # No camera takes longer from one frame to the next.
+    if t is not None and len(t) > 1 and (step := np.median(np.diff(t))) > 2.0:
         doubts += (
-            f"{name}: its times are {np.median(np.diff(t)):.4g} apart: if these are milliseconds, "
+            f"{name}: its times are {step:.4g} apart: if these are milliseconds, "
             f"call the column {clock}_ms",
         )
     if frames is None or t is not None:
@@ -472,8 +466,9 @@ def _unrounded(t: Floats) -> Floats:
 
 def _counts(frames: Floats) -> bool:
     """Whether these are numbers of frames."""
-    whole = bool((frames == np.rint(frames)).all()) and np.isfinite(frames).all()
-    return bool(whole and (np.diff(frames) > 0).all() and np.ptp(frames) < _MOST_FRAMES)
+    if not np.isfinite(frames).all() or (frames != np.rint(frames)).any():
+        return False
+    return bool((np.diff(frames) > 0).all() and np.ptp(frames) < 10_000_000)
 
 
 def _is_of_tracker(header: list[list[str]]) -> bool:

@@ -20,6 +20,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -201,11 +202,9 @@ def _track_blobs(reel: Reel, model: BackgroundModel) -> tuple[Track, bool]:
 
 def _link_detections(path: str | os.PathLike, name: str | os.PathLike) -> Track:
     detector = LearnedDetector() if name == "learned" else OnnxDetector(name)
-    sightings = [detections(detector.predict(frame)) for frame in read_video(path)]
-    chain = link(sightings)
+    chain = link([detections(detector.predict(frame)) for frame in read_video(path)])
     pixels = np.array([d.centre if d else (np.nan, np.nan) for d in chain], float)
-    confidence = np.array([d.confidence if d else 0.0 for d in chain])
-    return Track(pixels, confidence, str(name))
+    return Track(pixels, np.array([d.confidence if d else 0.0 for d in chain]), str(name))
 
 
 def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
@@ -225,12 +224,11 @@ def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
         One entry a frame.
     """
     flat = [(i, d) for i, seen in enumerate(sightings) for d in seen]
-    rows = [
-        (*d.centre, *(d.centre - d.size / 2), *d.size, d.size.prod(), *np.zeros(6), d.confidence)
-        for _, d in flat
-    ]
-    frames = np.array([i for i, _ in flat], int)
-    seen = Candidates.of(frames, np.eye(3), np.array(rows, float).reshape(-1, 14))
+    rows = np.zeros((len(flat), 14))
+    for row, (_, d) in zip(rows, flat, strict=True):
+        row[:7] = *d.centre, *(d.centre - d.size / 2), *d.size, d.size.prod()
+        row[13] = d.confidence
+    seen = Candidates.of(np.array([i for i, _ in flat], int), np.eye(3), rows)
     chain: list[Detection | None] = [None] * len(sightings)
     for row in best_path(seen, len(sightings))[0]:
         chain[flat[row][0]] = flat[row][1]
@@ -287,47 +285,42 @@ def _lanes(
     lanes: list[list[Motion]] = []
     left = []
     plainest = max((path.rating / len(path.rows) for path in paths), default=0.0)
+    taken = np.zeros((count, 1 + seen.frame.max(initial=0)), bool)
     for path in sorted(paths, key=lambda path: -len(path.rows)):
         # Worth of a candidate of a path, relative to those of the plainest.
         if path.rating / len(path.rows) < 0.4 * plainest:
             continue
-        free = [lane for lane in lanes if not any(_overlap(seen, path, other) for other in lane)]
-        if free:
-            free[0].append(path)
-        elif len(lanes) < count:
-            lanes.append([path])
-        else:
+        first, last = seen.frame[path.rows[[0, -1]]]
+        free = np.flatnonzero(~taken[:, first : last + 1].any(axis=1))
+        if not len(free):
             left.append(path)
+            continue
+        taken[free[0], first : last + 1] = True
+        if free[0] == len(lanes):
+            lanes.append([])
+        lanes[free[0]].append(path)
     return lanes, left
-
-
-def _overlap(seen: Candidates, one: Motion, other: Motion) -> bool:
-    """Do two paths share any of the time from their first frames to their last?"""
-    (a, b), (c, d) = (seen.frame[path.rows[[0, -1]]] for path in (one, other))
-    return bool(a <= d and c <= b)
 
 
 def _joined(ways: list[Ways]) -> Ways:
     """The ways of paths that follow each other as one."""
-    centre, box, colour = (field.copy() for field in ways[0])
-    for way in ways[1:]:
-        here = np.isfinite(way.centre[:, 0]) & np.isnan(centre[:, 0])
-        centre[here], box[here], colour[here] = way.centre[here], way.box[here], way.colour[here]
-    return Ways(centre, box, colour)
+    whole, *others = ways
+    for way in others:
+        free = np.isnan(whole.centre[:, :1])
+        whole = Ways(*(np.where(free, b, a) for a, b in zip(whole, way, strict=True)))
+    return whole
 
 
 def _touching(ways: list[Ways]) -> list[Bools]:
     """In which frames each target touches another one, or hides it."""
     found = [np.zeros(len(ways[0].centre), bool) for _ in ways]
-    for i, one in enumerate(ways):
-        for j, other in enumerate(ways[:i]):
-            apart = np.linalg.norm(one.centre - other.centre, axis=1)
-            sizes = (one.box[:, 2:].max(axis=1) + other.box[:, 2:].max(axis=1)) / 2
-            with np.errstate(invalid="ignore"):
-                # Sizes, and pixels more, between two targets that do not touch.
-                met = apart < 1.3 * sizes + 2.0
-            found[i] |= met
-            found[j] |= met
+    for (i, one), (j, other) in combinations(enumerate(ways), 2):
+        apart = np.linalg.norm(one.centre - other.centre, axis=1)
+        sizes = (one.box[:, 2:].max(axis=1) + other.box[:, 2:].max(axis=1)) / 2
+        # Sizes, and pixels more, between two targets that do not touch.
+        met = apart < 1.3 * sizes + 2.0
+        found[i] |= met
+        found[j] |= met
     return found
 
 

@@ -32,11 +32,6 @@ SIDE = 96  # pixels; width and height of a training frame
 
 _POOLED = 512  # pixels; width and height of the backgrounds that frames are cut from
 _EACH = 12  # such backgrounds of each kind
-_RATE = 3e-3  # largest learning rate
-_WARMING = 0.05  # of the steps: the rate rises
-_ABSENT = 0.15  # of the frames show no target
-_WHOLE, _HIDDEN = 0.95, 0.6  # visible share of the target above which it is one, below which none
-_CURVE = 100  # points of the loss curve in the log
 
 # ------------------------------------------------------------------------------------------ frames
 
@@ -64,7 +59,7 @@ def training_frame(rng: np.random.Generator, pool: Image) -> tuple[LabelledFrame
         image_size=(SIDE, SIDE),
     )
     centre = rng.uniform(-0.5, SIDE - 0.5, 2)
-    if rng.random() < _ABSENT:
+    if rng.random() < 0.15:  # without a target
         centre = np.full(2, np.nan)
     elif occluders and rng.random() < 0.5:  # near an edge of an occluder, where it is hard
         box = np.array(occluders[-1])
@@ -188,7 +183,8 @@ def _batch(seed: int, step: int, pool: Image) -> tuple[torch.Tensor, ...]:
     frames, centres = zip(*(training_frame(rng, pool) for rng in rngs), strict=True)
     images = as_input(np.stack([drawn.frame for drawn in frames]))
     visible = np.array([drawn.visible for drawn in frames])
-    presence = np.clip((visible - _HIDDEN) / (_WHOLE - _HIDDEN), 0, 1)
+    # Seen to 0.95 it is a target, to 0.6 it is none.
+    presence = np.clip((visible - 0.6) / (0.95 - 0.6), 0, 1)
     sizes = np.nan_to_num([drawn.extent for drawn in frames], nan=1.0)
     labels = (np.nan_to_num(centres), sizes, presence)
     return images, *(torch.as_tensor(label, dtype=torch.float32) for label in labels)
@@ -223,7 +219,8 @@ def train(
         torch.manual_seed(seed)
         network = Network().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     optimiser = torch.optim.AdamW(network.parameters(), weight_decay=1e-3)
-    schedule = lr_scheduler.OneCycleLR(optimiser, _RATE, steps + 1, pct_start=_WARMING)
+    # The largest learning rate, to which it rises over a twentieth of the steps.
+    schedule = lr_scheduler.OneCycleLR(optimiser, 3e-3, steps + 1, pct_start=0.05)
     pool = background_pool(np.random.default_rng(seed))
     losses: list[float] = []
     for step in trange(steps, unit="step", disable=None):
@@ -245,7 +242,7 @@ def train(
 
 def _training_log(seed: int, losses: list[float], parameters: int) -> dict[str, Any]:
     """What the training was, as it goes into a JSON file."""
-    block = max(len(losses) // _CURVE, 1)
+    block = max(len(losses) // 100, 1)  # of as many points the curve is
     means = [np.mean(losses[i : i + block]) for i in range(0, len(losses), block)]
     return {
         "seed": seed,

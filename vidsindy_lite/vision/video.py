@@ -40,12 +40,6 @@ if TYPE_CHECKING:
     from av.video.stream import VideoStream
 
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".ppm", ".pgm"})
-LOSSLESS = {".mov": "qtrle", ".mkv": "FFV1"}  # codecs, unless another is asked for
-
-# Of a tick by which rounded times may be off: a whole one is a frame in some files.
-_LESS = 1 - 1e-6
-_BITS = (8, 10, 12, 14, 16)  # of cameras
-_LOOKED_AT = 9  # images that tell how many bits a film uses
 _ROOM = 300_000_000  # bytes of frames that are kept, whole or reduced
 
 # When a packet's frame is shown, in ticks of the stream, and whether decoding can begin there.
@@ -66,8 +60,9 @@ def timing(packets: Sequence[Shown], stream: VideoStream) -> tuple[Floats, float
     # Between dropped frames, most follow each other at an even rate, which may not be the stated.
     counted = np.concatenate(([0.0], np.cumsum(np.rint(steps * tick / usual))))
     mean = counted[-1] / seconds[-1]
+    # By less than a tick rounded times may be off: a whole one is a frame in some files.
     for clock, rate in ((even, stated), (counted, stated), (counted, mean)):
-        if rate > 0 and np.abs(seconds * rate - clock).max() < _LESS * rate * tick:
+        if rate > 0 and np.abs(seconds * rate - clock).max() < (1 - 1e-6) * rate * tick:
             return clock, rate
     return seconds / usual, 1 / usual
 
@@ -110,15 +105,12 @@ def upper_field(frame: VideoFrame) -> Image:
     )
     graph.link_nodes(source, graph.add("field", "type=top"), graph.add("buffersink")).configure()
     graph.push(frame)
-    lines = cast("VideoFrame", graph.pull()).to_ndarray(format="bgr24", threads=1)
-    return with_lines_between(_turned(cast("Image", lines)))[: frame.height]
-
-
-def with_lines_between(field: Image) -> Image:
-    """A field with the mean of two lines between them, and the last one twice."""
+    pulled = cast("VideoFrame", graph.pull())
+    field = _turned(cast("Image", pulled.to_ndarray(format="bgr24", threads=1)))
+    # Between two lines their mean, and the last one twice.
     lower = np.concatenate((field[1:], field[-1:]))
     between = ((field.astype(np.uint16) + lower + 1) // 2).astype(np.uint8)
-    return np.stack((field, between), axis=1).reshape(-1, *field.shape[1:])
+    return np.stack((field, between), axis=1).reshape(-1, *field.shape[1:])[: frame.height]
 
 
 class Stills(NamedTuple):
@@ -142,13 +134,30 @@ class Stills(NamedTuple):
         return _turned(cast("Image", image))
 
     def bits(self) -> int:
-        """How many bits the film uses, by some of its images."""
-        shown = np.unique(np.linspace(0, len(self.files) - 1, _LOOKED_AT).astype(int))
-        images = [self._decoded(int(k)) for k in shown]
-        if all(image is None or image.dtype == np.uint8 for image in images):
-            return 8
-        largest = max(int(image.max()) for image in images if image is not None)
-        return next((bits for bits in _BITS if largest < 2**bits), _BITS[-1])
+        """How many bits the film uses, by some of its images: an even number, from 8 to 16."""
+        shown = np.unique(np.linspace(0, len(self.files) - 1, 9).astype(int)).tolist()
+        images = [image for k in shown if (image := self._decoded(k)) is not None]
+        used = max((int(image.max()) for image in images), default=0).bit_length()
+        return max(used + used % 2, 8)
+
+    def pick(self, numbers: Iterable[int]) -> Iterator[Image]:
+        """The images of these numbers as far as they go, red, green and blue, all of one size.
+
+        Raises
+        ------
+        ValueError
+            Where an image cannot be read or has another size.
+        """
+        size, bits = None, self.bits()
+        for k in (number for number in numbers if number < len(self.files)):
+            image = self.read(k, bits)
+            size = size or image.shape[1::-1]
+            if image.shape[1::-1] != size:
+                raise ValueError(
+                    f"path: all images of a film must have one size, {size}, got "
+                    f"{image.shape[1::-1]} in '{self.files[k]}'"
+                )
+            yield image
 
     def _decoded(self, number: int) -> np.ndarray | None:
         """An image as it is stored, but for its colours."""
@@ -158,8 +167,8 @@ class Stills(NamedTuple):
                 _, images = cv2.imreadmulti(str(file), number, 1, flags=how)
                 return images[0] if images else None
             # Not imread, which knows no Chinese name on some systems.
-            return cv2.imdecode(np.fromfile(file, np.uint8), how) if _holds(file) else None
-        except cv2.error:  # such as a header of more pixels than there are
+            return cv2.imdecode(np.fromfile(file, np.uint8), how)
+        except (cv2.error, OSError):  # such as a header of more pixels than there are
             return None
 
 
@@ -181,49 +190,32 @@ def find_stills(path: Path) -> Stills | None:
         If there are no such images, or their numbers do not tell their order.
     """
     if path.is_file() and path.suffix.lower() in (".tif", ".tiff"):
-        count = cv2.imcount(str(path)) if _holds(path) else 0
+        count = cv2.imcount(str(path)) if path.stat().st_size else 0
         return Stills([path] * count, np.arange(count, dtype=float), True) if count else None
     if path.is_file() or not (path.is_dir() or re.search(r"[*?]|%\d*d", path.name)):
         return None
     if path.is_dir():
-        files = [file for file in path.iterdir() if file.suffix.lower() in SUFFIXES]
-        files = [file for file in files if not file.name.startswith(".")]
+        files = [file for file in path.glob("[!.]*") if file.suffix.lower() in SUFFIXES]
+        if not files:
+            raise ValueError(
+                f"path: must be a video file, or a folder of images, got '{path}' without any"
+            )
     else:
-        folder = path.parent if path.parent.is_dir() else Path()
-        named = re.compile(_expression(path.name))
-        files = [file for file in folder.iterdir() if named.fullmatch(file.name)]
-    if not files and not path.is_dir():
-        raise FileNotFoundError(
-            f"path: no such video file, nor images of that name, got {str(path)!r}"
-        )
-    if not files:
-        raise ValueError(
-            f"path: must be a video file, or a folder of images, got '{path}' without any"
-        )
-    numbers = [_number(file) for file in files]
-    if None in numbers:
+        named = re.sub(r"%\d*d", r"\\d+", re.escape(path.name))
+        named = named.replace(r"\*", ".*").replace(r"\?", ".")
+        files = [file for file in path.parent.glob("*") if re.fullmatch(named, file.name)]
+        if not files:
+            raise FileNotFoundError(
+                f"path: no such video file, nor images of that name, got {str(path)!r}"
+            )
+    numbers = [re.findall(r"\d+", file.stem)[-1:] for file in files]
+    if [] in numbers:
         return Stills(sorted(files), np.arange(len(files), dtype=float))
-    return _in_order(path, files, np.array(numbers, dtype=float))
-
-
-def _expression(name: str) -> str:
-    """A pattern of names as a regular expression."""
-    parts = re.split(r"(%\d*d|[*?])", name)
-    meaning = {"*": ".*", "?": "."}
-    return "".join(
-        r"\d+" if part.startswith("%") and len(part) > 1 else meaning.get(part, re.escape(part))
-        for part in parts
-    )
-
-
-def _number(file: Path) -> int | None:
-    """The last number in a file's name."""
-    found = re.findall(r"\d+", file.stem)
-    return int(found[-1]) if found else None
+    return _in_order(path, files, np.array(numbers, dtype=float)[:, 0])
 
 
 def _in_order(path: Path, files: list[Path], numbers: Floats) -> Stills:
-    """Images by their numbers, which must be those of frames."""
+    """Images by the last numbers in their names, which must be those of frames."""
     order = np.argsort(numbers)
     steps = np.diff(numbers[order])
     step = steps.min() if steps.size else 1.0
@@ -237,31 +229,6 @@ def _in_order(path: Path, files: list[Path], numbers: Floats) -> Stills:
             f"{files[order[1]].name}, ... in '{path}': rename them 0001, 0002, ..."
         )
     return Stills([files[i] for i in order], (numbers[order] - numbers.min()) / step)
-
-
-def read_stills(stills: Stills) -> Iterator[Image]:
-    """The images one after the other, red, green and blue, all of one size.
-
-    Raises
-    ------
-    ValueError
-        Where an image cannot be read or has another size.
-    """
-    size, bits = None, stills.bits()
-    for k, file in enumerate(stills.files):
-        image = stills.read(k, bits)
-        size = size or image.shape[1::-1]
-        if image.shape[1::-1] != size:
-            raise ValueError(
-                f"path: all images of a film must have one size, {size}, got "
-                f"{image.shape[1::-1]} in '{file}'"
-            )
-        yield image
-
-
-def _holds(file: Path) -> bool:
-    """Whether there is anything in it: OpenCV fails at nothing with a message of its own."""
-    return file.is_file() and file.stat().st_size > 0
 
 
 class _Codec(NamedTuple):
@@ -282,13 +249,6 @@ CODECS = {
     "H264": _Codec((".mp4", ".mkv"), "libx264", "yuv420p"),
     "MJPG": _Codec((".avi", ".mkv"), "mjpeg", "yuvj420p", 3),
 }
-
-FRAME_RATES = 0.01, 10_000.0  # per second, that all these files can hold, with one exception:
-_FASTEST_MKV = 1_000.0  # since its clock counts milliseconds
-_TICKS = 65_535  # largest numerator and denominator of a rate in MPEG-4, and so in all these files
-_KEY_FRAMES = 50  # frames from one that stands on its own to the next: a jump costs half of that
-_FINEST = 3  # finest quantiser of the lossy codecs, OpenCV's
-_MOST_BITS = 2**30  # per second, of a lossy codec
 
 
 class VideoInfo(NamedTuple):
@@ -342,9 +302,9 @@ def write_video(
     path = check_path("path", path)
     check_instance("frames", frames, Iterable)
     suffix = path.suffix.lower()
-    if codec is None and suffix not in LOSSLESS:
+    codec = codec or {".mov": "qtrle", ".mkv": "FFV1"}.get(suffix)
+    if codec is None:
         raise ValueError(f"path: must end in .mov or .mkv unless codec is given, got '{path}'")
-    codec = codec or LOSSLESS[suffix]
     check_choice("codec", codec, CODECS)
     if suffix not in CODECS[codec].suffixes:
         allowed = " or ".join(CODECS[codec].suffixes)
@@ -363,11 +323,11 @@ def write_video(
 
 def _frame_rate(fps: float | Fraction, suffix: str) -> Fraction:
     """The fraction next to a frame rate that a file of that suffix holds."""
-    low, high = FRAME_RATES
-    high = _FASTEST_MKV if suffix == ".mkv" else high
-    if not low <= check_number("fps", fps) <= high:
-        raise ValueError(f"fps: must be in [{low:g}, {high:g}] for {suffix}, got {fps}")
-    return Fraction(float(fps)).limit_denominator(int(_TICKS / max(fps, 1)))
+    high = 1_000.0 if suffix == ".mkv" else 10_000.0  # its clock counts milliseconds
+    if not 0.01 <= check_number("fps", fps) <= high:
+        raise ValueError(f"fps: must be in [0.01, {high:g}] for {suffix}, got {fps}")
+    # Numerator and denominator have 16 bits in MPEG-4, and so in all these files.
+    return Fraction(float(fps)).limit_denominator(int(65_535 / max(fps, 1)))
 
 
 def _encode(
@@ -425,15 +385,16 @@ def _add_stream(
     container: OutputContainer, codec: _Codec, rate: Fraction, size: tuple[int, int]
 ) -> VideoStream:
     """A stream that takes the frames; the same bytes on any number of cores."""
-    options = {"g": str(_KEY_FRAMES)} if codec.encoder == "qtrle" else {}
+    # Frames from one that stands on its own to the next: a jump costs half of that.
+    options = {"g": "50"} if codec.encoder == "qtrle" else {}
     stream = cast("VideoStream", container.add_stream(codec.encoder, rate, options=options))
     stream.width, stream.height = size
     stream.pix_fmt = codec.pixels
     stream.codec_context.thread_count = 1
     if codec.bits:
         granted = codec.bits * size[0] * size[1] * float(rate)
-        stream.codec_context.bit_rate = int(min(granted, _MOST_BITS))
-        stream.codec_context.qmin = _FINEST
+        stream.codec_context.bit_rate = int(min(granted, 2**30))
+        stream.codec_context.qmin = 3  # the finest quantiser, OpenCV's
     return stream
 
 
@@ -460,13 +421,9 @@ def read_video(path: str | os.PathLike) -> Iterator[Image]:
     FileNotFoundError, ValueError
         At once, if the file is missing, empty, not a video, or holds no frame.
     """
-    stills = find_stills(check_path("path", path))
-    if stills:
-        stills.read(0, 16)
-        return read_stills(stills)
-    with _opened(path) as (container, stream):
-        _first(path, container, stream)
-    return _images(path)
+    _first(path)
+    stills = find_stills(Path(path))
+    return stills.pick(range(len(stills.files))) if stills else _images(path)
 
 
 def read_frame(path: str | os.PathLike, number: int) -> Image:
@@ -515,11 +472,7 @@ def video_info(path: str | os.PathLike) -> VideoInfo:
     FileNotFoundError, ValueError
         If the file is missing, empty, not a video, or holds no frame.
     """
-    stills = find_stills(check_path("path", path))
-    if stills:
-        return VideoInfo(len(stills.files), 0.0, stills.read(0, 16).shape[1::-1])
-    with _opened(path) as (container, stream):
-        size = _first(path, container, stream).shape[1::-1]
+    size = _first(path).shape[1::-1]
     clock, rate = _clock(path)
     return VideoInfo(len(clock), rate, size)
 
@@ -544,14 +497,13 @@ def frame_clock(path: str | os.PathLike) -> Floats:
     FileNotFoundError, ValueError
         See `read_video`.
     """
-    stills = find_stills(check_path("path", path))
-    if stills:
-        return stills.clock
     return _clock(path)[0]
 
 
 def _clock(path: str | os.PathLike) -> tuple[Floats, float]:
     """When each frame was taken, those included that were cut off a file later; and their rate."""
+    if stills := find_stills(check_path("path", path)):
+        return stills.clock, 0.0
     with _opened(path) as (container, stream):
         stated, hidden, packets, end = stream.frames, 0, [], 0.0
         for packet in container.demux():
@@ -574,10 +526,8 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
     In a video, the packets say, without being decoded, when each frame is shown and where decoding
     can begin: a jump meets the right frame, also where frames are not evenly spaced in time.
     """
-    stills = find_stills(check_path("path", path))
-    if stills:
-        bits = stills.bits()
-        yield from (stills.read(k, bits) for k in numbers if k < len(stills.files))
+    if stills := find_stills(check_path("path", path)):
+        yield from stills.pick(numbers)
         return
     with _opened(path) as (container, stream):
         packets = _packets(container, stream)
@@ -649,12 +599,13 @@ def _decoded(
             yield from packet.decode()
 
 
-def _first(path: str | os.PathLike, container: InputContainer, stream: VideoStream) -> Image:
-    """The first frame of a file just opened, which must have one."""
-    frame = next(_decoded(container, stream), None)
-    if frame is None:
-        raise ValueError(f"path: must hold at least one frame, got none in '{path}'")
-    return _image(frame)
+def _first(path: str | os.PathLike) -> Image:
+    """The first frame of a film, which must have one."""
+    if stills := find_stills(check_path("path", path)):
+        return stills.read(0, 16)
+    for image in _images(path):
+        return image
+    raise ValueError(f"path: must hold at least one frame, got none in '{path}'")
 
 
 def _images(path: str | os.PathLike) -> Iterator[Image]:
