@@ -418,7 +418,7 @@ def _top(values: Floats) -> float:
 
 
 def followed(
-    frames: Reel, maps: Floats, found: Candidates, seed: tuple[int, Floats, Floats]
+    frames: Reel, maps: Floats, found: Candidates, seed: tuple[int, Floats, Floats], pace: Floats
 ) -> Looks:
     """Follow a target by its looks, both ways.
 
@@ -431,6 +431,8 @@ def followed(
     found : Candidates
     seed : int, ndarray, ndarray
         A frame in which the target is known, its centre and size there, in reduced pixels.
+    pace : ndarray, shape (2,)
+        By how much a frame it moves there: what is small is soon beyond its looks.
     """
     n = len(maps)
     factor = frames.factor if frames.whole.few else 1
@@ -450,7 +452,7 @@ def followed(
             if i == first:
                 continue
             gap = abs(i - last[-1][0])
-            speed = np.zeros(2)
+            speed = way * pace
             if len(last) > 1:
                 speed = (last[-1][1] - last[-2][1]) / abs(last[-1][0] - last[-2][0])
             ahead = carry(np.linalg.inv(maps[i]), (last[-1][1] + speed * min(gap, 8))[None])[0]

@@ -41,6 +41,9 @@ from .video import Reel, reduce
 _SHORTEST = 5  # frames of a path
 
 
+_LOOKS_ALONE = "no view tells it from its ground: it is followed by its looks alone"
+
+
 @dataclass(frozen=True, eq=False)
 class Track:
     """The target in each frame of a video; `np.asarray` of it is its pixels.
@@ -154,12 +157,16 @@ def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
     if seed is None and boxes is not None and _turns_only(seen, rows):
         return nothing(film.motion, n)
     start = seed or _plainest(seen, rows)
-    looks = followed(frames, film.maps[:n], seen, start)
+    near = rows[np.abs(seen.frame[rows] - start[0]) <= 2]
+    pace = np.polyfit(seen.frame[near], seen.place[near], 1)[0] if len(near) > 1 else np.zeros(2)
+    looks = followed(frames, film.maps[:n], seen, start, pace)
     both = _together(seen, looks, film.maps, start[0], told=seed is not None)
     rows, _ = best_path(both)
     if len(rows) < _SHORTEST:
         return nothing(film.motion, n)
     doubts = _doubts(film, seen, paths, hint)
+    if _differing(seen, both.only(rows)) < 0.5:
+        doubts += (_LOOKS_ALONE,)
     ways = expected(both, rows, film, n)
     lens = lens_of(samples, film, ways)
     views = viewed(film, lens, ways, lights)
@@ -286,6 +293,16 @@ def _together(
     alike.quality[at == first] += TOLD
     kept = (seen.frame != first) | (not told)
     return Candidates.joined([seen._replace(quality=quality).only(kept), alike])
+
+
+def _differing(seen: Candidates, path: Candidates) -> float:
+    """In what share of its frames something is seen to differ where a path leads."""
+    reach = 0.35 * np.sqrt(path.area) + 1
+    apart = [
+        np.linalg.norm(seen.centre[seen.frame == i] - centre, axis=1).min(initial=np.inf)
+        for i, centre in zip(path.frame, path.centre, strict=True)
+    ]
+    return float((apart < reach).mean())
 
 
 def lens_of(samples: Image, film: Film, *ways: Ways) -> Lens:
@@ -452,6 +469,5 @@ def _filled(
         shift = np.median((found.pixels - alike)[near], axis=0) if len(near) > 2 else 0
         pixels[i], confidence[i] = alike[i] + shift, rough
     if not len(at) and np.isfinite(pixels[:, 0]).any():
-        looks_only = "no view tells it from its ground: it is followed by its looks alone"
-        return replace(found, pixels=pixels, confidence=confidence, warnings=(looks_only,))
+        return replace(found, pixels=pixels, confidence=confidence, warnings=(_LOOKS_ALONE,))
     return replace(found, pixels=pixels, confidence=confidence)
