@@ -883,7 +883,7 @@ def _far_neighbours(wider: Wider, remedy: str, odds_allowed: float = 0.02) -> It
         model.information, model.gradient, present, penalties, support
     )
     if odds > odds_allowed:
-        out, into = (" and ".join(place(law, columns[k]) for k in at) for at in (dropped, added))
+        out, into = (place(law, columns[k]) if k >= 0 else "" for k in (dropped, added))
         change = f"{into} instead of {out}" if out and into else f"with {into}" if into else ""
         change = change or f"without {out}"
         yield (
