@@ -104,11 +104,11 @@ class Problem:
     @cached_property
     def functions(self) -> tuple[Function, ...]:
         """Those of the library, of standard points."""
-        centre, scale, sizes = self.units.centre, self.units.scale, self.units.sizes
-        return tuple(
-            function.standardised(centre, scale, size)
-            for function, size in zip(self.form.functions, sizes.tolist(), strict=False)
-        )
+
+        def standard(function: Function, size: float) -> Function:
+            return replace(function, value=lambda x: function.value(self.units.point(x)) / size)
+
+        return tuple(map(standard, self.form.functions, self.units.sizes.tolist()))
 
     def terms(self, x: Floats) -> Floats:
         """All candidate terms at standard points, (n, l); those with a slope are 0."""
