@@ -77,7 +77,12 @@ def shapes(
     directions, flat = _across(x, noise)
     d, where = x.shape[1], _round(x, noise, flat)
     if where is not None:
-        yield _told(where)
+        round_one, _, _ = str(where).partition("\n")
+        free = "angle is" if where.shape == "circle" else "angles are"
+        yield (
+            f"the motion stays on a {round_one}: there its coordinates depend on each other and "
+            f"many laws fit alike; its {free} free (on_{where.shape} finds it), and order=2 a law"
+        )
     elif flat:
         shape = {1: "on a line", 2: "in a plane"}.get(d - flat, f"in {d - flat} of {d} dimensions")
         moving = [name for name, moves_too in zip(names, moves, strict=True) if moves_too]
@@ -165,23 +170,6 @@ def _round(x: Floats, noise: Floats, flat: int) -> Round | None:
     back = np.abs(np.diff(pieces)).sum() > 1.5 * length
     bound = back or (d > 2 and length > np.pi)
     return where if bound and _on(off, error, widths[-2], 10 * CLOSE if back else CLOSE) else None
-
-
-def _told(where: Round) -> str:
-    free = "angle is free: on_circle finds it"
-    if where.shape == "sphere":
-        free = "angles are free: on_sphere finds them"
-    # A number without the digits that its error, one of them excepted, leaves no meaning.
-    digits = 1 - np.floor(np.log10(np.maximum(where.centre_errors, LEAST))).astype(int)
-    centre = ", ".join(
-        f"{round(value, n) + 0.0:.4g} +- {error:.1g}"
-        for value, n, error in zip(where.centre, digits.tolist(), where.centre_errors, strict=True)
-    )
-    return (
-        f"the motion stays on a {where.shape} (centre {centre}; radius {where.radius:.5g} +- "
-        f"{where.radius_error:.1g}): there its coordinates depend on each other and many laws fit "
-        f"alike; its {free}, and order=2 a law"
-    )
 
 
 def _closed(t: Floats, x: Floats, noise: Floats, terms: Ints, most: int = 3000) -> Iterator[str]:
@@ -403,17 +391,16 @@ class Wider:
     Parameters
     ----------
     problem : Problem
-        With all of these as candidates; it has no penalties.
+        With all of these as candidates; its penalties are those of the library alone.
     fit : Fit
         With the old terms alone.
-    further : ndarray of int
-        Places in the coefficients, equation by equation, of the terms that the library has not, not
-        even as a function of another name.
+    old : int
+        How many terms the library has.
     """
 
     problem: Problem
     fit: Fit
-    further: Ints
+    old: int
 
     @cached_property
     def model(self) -> Linearisation:
@@ -421,10 +408,16 @@ class Wider:
         return self.problem.model(self.fit)
 
     @cached_property
+    def further(self) -> Ints:
+        """Places in the coefficients, equation by equation, of terms that the library has not."""
+        searched = self.problem.form.searched
+        return searched[searched % len(self.problem.exponents) >= self.old]
+
+    @cached_property
     def beyond(self) -> Beyond:
         """The score test of the terms that the law has not."""
-        own, searched = np.flatnonzero(self.fit.state.free()), self.problem.form.searched
-        others = np.append(self.further, np.setdiff1d(searched, np.append(own, self.further)))
+        own = np.flatnonzero(self.fit.state.free())
+        others = np.setdiff1d(self.problem.form.searched, own)
         model = self.model.of(np.append(own, others))
         estimate, variance = newcomers(model.information, model.gradient, len(own))
         single = estimate**2 / variance
@@ -442,44 +435,40 @@ class Wider:
 def widened(problem: Problem, fit: Fit, budget: float = 5e6) -> Wider:
     """The last fit among terms beyond its library; of a fraction, in its numerators.
 
-    The budget is of entries of the derivatives of the data, or the curve, in the further terms.
+    Further terms are such as no function of the library is. The budget is of entries of the
+    derivatives of the data, or the curve, in these.
     """
     form, state, (size, d) = problem.form, fit.state, problem.form.known.shape
-    equations, grid = np.flatnonzero(form.candidates.any(axis=0)), fit.collocation.grid
-    entries = max(grid.x.size, grid.r * d) * len(equations)
+    equations, along = np.flatnonzero(form.candidates.any(axis=0)), fit.collocation.grid
+    entries = max(along.x.size, along.r * d) * len(equations)
     exponents = _higher(problem.exponents, form.states, budget / entries)
-    l = len(exponents)
 
     def padded(array: NDArray[Any]) -> NDArray[Any]:
-        return np.pad(array, ((0, l - size), (0, 0)))
+        return np.pad(array, ((0, len(exponents) - size), (0, 0)))
 
-    places = np.arange(d * l).reshape(d, l)
-    further, shared = places[equations, size:].ravel(), places.copy()
+    candidates = padded(form.candidates)
+    candidates[size:, equations] = True
+    places = np.arange(candidates.size).reshape(d, -1)
+    shared = places.copy()
     shared[:, :size] = places[:, :size].ravel()[form.shared].reshape(d, size)
     state = replace(
         state, coefficients=padded(state.coefficients), active=padded(state.active),
         shared=shared.ravel(),
     )  # fmt: skip
-    # With a known part of its own shape: a collocation is made for its library.
     known = padded(fit.collocation.known)
-    fit = replace(
-        fit, state=state, collocation=replace(fit.collocation, exponents=exponents, known=known)
-    )
-
-    def among(further: Ints) -> Wider:
-        candidates = padded(form.candidates) | np.isin(places.T, further)
-        wide = replace(
-            form, exponents=exponents, candidates=candidates, known=padded(form.known),
-            shared=shared.ravel(),
-        )  # fmt: skip
-        return Wider(replace(problem, form=wide, penalties=np.full(l, np.nan)), fit, further)
-
-    wider = among(further)
-    if form.functions:  # a function may be a monomial, and then it is no further term
-        old = np.setdiff1d(wider.problem.form.searched, further)
-        model = wider.model.of(np.append(old, further))
+    whole = replace(fit.collocation, exponents=exponents, known=known)
+    fit = replace(fit, state=state, collocation=whole)
+    form = replace(
+        form, exponents=exponents, candidates=candidates, known=padded(form.known),
+        shared=shared.ravel(),
+    )  # fmt: skip
+    wider = Wider(replace(problem, form=form), fit, size)
+    if form.functions:
+        old = np.setdiff1d(form.searched, wider.further)
+        model = wider.model.of(np.append(old, wider.further))
         _, variance = newcomers(model.information, model.gradient, len(old))
-        wider = among(further[np.isfinite(variance)])
+        candidates.T.flat[wider.further[~np.isfinite(variance)]] = False
+        wider = Wider(wider.problem, fit, size)
     return wider
 
 
@@ -689,7 +678,7 @@ def _met(problem: Problem, fit: Fit) -> list[Bools]:
 
 
 def outliers(
-    trajectories: Sequence[Trajectory], met: Sequence[Bools] | None = None, limit: float = 30.0
+    trajectories: Sequence[Trajectory], met: Sequence[Bools], limit: float = 30.0
 ) -> list[str]:
     """Samples so far from those around them that they must be errors.
 
@@ -697,7 +686,7 @@ def outliers(
     ----------
     trajectories : sequence of Trajectory
         The data in the user's units.
-    met : sequence of ndarray of bool, shape (n,), optional
+    met : sequence of ndarray of bool, shape (n,)
         Which samples of each a law passes through: what it explains is no error.
     limit : float
         Distance of a sample from those around it, over how far nine samples in ten are from the
@@ -705,24 +694,24 @@ def outliers(
         50 % makes 6.
     """
     found = []
-    met = [np.zeros(len(t), dtype=bool) for t, _ in trajectories] if met is None else met
     for (t, x), explained in zip(trajectories, met, strict=True):
-        far: set[int] = set()
+        far = np.zeros(len(t), dtype=bool)
         for column in x.T[np.isfinite(x).any(axis=0)]:
             seen = np.flatnonzero(np.isfinite(column))
             values = column[seen]
             distance = np.abs(values - np.median(values))
             spread = np.quantile(distance, 0.9)
-            for row in np.flatnonzero((distance > limit * spread) & (spread > 0)).tolist():
-                # Far from those around it, too, it is no part of a motion far away. These are from
-                # 3 to 8 before and after it: so three errors in a row are compared with none.
-                beside = np.append(values[max(row - 8, 0) : max(row - 2, 0)], values[row + 3 :][:6])
-                middle = np.median(beside)
-                if abs(values[row] - middle) > limit * np.median(np.abs(beside - middle)):
-                    far.add(int(seen[row]))
-        far -= set(np.flatnonzero(explained).tolist())
+            rows = np.flatnonzero((distance > limit * spread) & (spread > 0))
+            # Far from those around it, too, it is no part of a motion far away. These are from 3 to
+            # 8 before and after it: so three errors in a row are compared with none.
+            around = np.append(np.arange(6), np.arange(11, 17)) + rows[:, None]
+            beside = np.pad(values, 8, constant_values=np.nan)[around]
+            apart = np.abs(values[rows] - np.nanmedian(beside, axis=1))
+            own = np.abs(beside - np.nanmedian(beside, axis=1, keepdims=True))
+            far[seen[rows[apart > limit * np.nanmedian(own, axis=1)]]] = True
         found += [
-            f"t = {t[row]:g}, x = ({', '.join(f'{v:g}' for v in x[row])})" for row in sorted(far)
+            f"t = {t[row]:g}, x = ({', '.join(f'{v:g}' for v in x[row])})"
+            for row in np.flatnonzero(far & ~explained).tolist()
         ]
     if not found:
         return []
