@@ -38,15 +38,3 @@ def test_many_right_hand_sides_are_solved_for(n, reach):
     solved = right.copy()
     solve_factored(cholesky_banded(band, lower=True), solved)
     np.testing.assert_allclose(full @ solved, right, atol=1e-10)
-
-
-@pytest.mark.parametrize("held", [1, 2, 3])
-def test_a_solution_is_the_same_however_many_blocks_are_(held):
-    rng = np.random.default_rng(held)
-    band = np.vstack((np.ones(5 * BLOCK - 7), rng.uniform(-0.2, 0.2, (3, 5 * BLOCK - 7))))
-    right = rng.normal(size=(band.shape[1], 4))
-    at_once, in_parts = right.copy(), right.copy()
-    solve_factored(band, at_once)
-    solve_factored(band, in_parts, held=held)
-    assert (at_once == in_parts).all()
-    assert not np.allclose(at_once, right)

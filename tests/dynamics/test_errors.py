@@ -10,7 +10,6 @@ from scipy.signal import lfilter
 from vidsindy_lite.dynamics.noise import (
     inflation,
     passing,
-    prediction_gain,
     time_inflation,
 )
 
@@ -47,14 +46,6 @@ def test_nothing_lasts_from_one_stretch_into_the_next():
     assert inflation([piece[:1] for piece in stretches])[0] == 1.0
 
 
-def test_each_coordinate_has_its_own_inflation():
-    rng = np.random.default_rng(5)
-    errors = np.stack([rng.standard_normal(50_000), lasting(50_000, 0.8, rng)], axis=1)
-    white, slow = inflation([errors])
-    assert white == 1.0
-    assert slow == pytest.approx(9, rel=0.15)
-
-
 def fit_with(residual, precision=1.0):
     """A fit that leaves these errors."""
     n, d = residual.shape
@@ -71,25 +62,6 @@ def fit_with(residual, precision=1.0):
         control_points=None, moving=np.zeros(d, dtype=bool), free=lambda: np.zeros(d, dtype=bool)
     )
     return SimpleNamespace(collocation=data, state=state)
-
-
-@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])
-def test_what_errors_foretell_is_as_theory_says(correlation):
-    error = lasting(20_000, correlation, np.random.default_rng(6))
-    gain = prediction_gain(fit_with(error[:, None]))[0]
-    assert gain == pytest.approx(20_000 * np.log(1 - correlation**2), rel=0.05, abs=20)
-
-
-def test_errors_of_what_was_not_seen_foretell_nothing():
-    assert prediction_gain(fit_with(np.zeros((100, 1))))[0] == 0
-
-
-def test_what_uneven_errors_foretell_is_counted_in_their_own_sizes():
-    rng, size = np.random.default_rng(7), np.where(np.arange(4000) < 200, 30.0, 1.0)[:, None]
-    error = size * np.concatenate([rng.standard_normal(200), lasting(3800, 0.9, rng)])[:, None]
-    weighed = prediction_gain(fit_with(error, size**-2.0))[0]
-    assert weighed == pytest.approx(3800 * np.log(1 - 0.9**2), rel=0.2)
-    assert prediction_gain(fit_with(error))[0] > 0.2 * weighed  # the large ones hide the others
 
 
 def test_errors_pass_that_are_forgotten_and_do_not_rebound():

@@ -5,7 +5,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import vidsindy_lite as vl
-from vidsindy_lite.dynamics import orientation, solver
 from vidsindy_lite.dynamics.l0 import inverse
 from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.orientation import (
@@ -150,29 +149,6 @@ def test_error_bars_of_a_turned_law_are_honest():
         missed = (found.coefficients - truth)[wanted]
         pulls += np.abs(missed / found.standard_errors[wanted]).tolist()
     assert np.mean(np.array(pulls) < 1.96) >= 0.9
-
-
-def test_axes_are_refined_only_for_a_law_that_is_then_sought(monkeypatch):
-    calls = []
-
-    def counted(module, name):
-        used = getattr(module, name)
-        monkeypatch.setattr(module, name, lambda *given: calls.append(name) or used(*given))
-
-    starts = orientation.rough_orientations
-    monkeypatch.setattr(
-        orientation,
-        "rough_orientations",
-        lambda *given: calls.append("start") or starts(*given)[:1],
-    )
-    counted(orientation, "refined")
-    counted(solver, "_solved")
-    law, t = vl.PolynomialSystem.from_terms(DUFFING), np.linspace(0, 20, 300)
-    x = law.simulate(t, [1.5, 0.4]) @ turned(np.array([0.5]), 2)
-    vl.discover(t, x, order=1, orientation="learn")
-    assert calls[:3] == ["_solved", "start", "_solved"]
-    assert calls[3:] == ["refined", "_solved"] * (len(calls) // 2 - 1)
-    assert len(calls) >= 5
 
 
 def test_where_no_axes_are_better_those_of_the_data_stay():

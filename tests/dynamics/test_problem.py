@@ -2,14 +2,13 @@
 
 from dataclasses import replace
 from itertools import product
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from helpers import posed
 
 from vidsindy_lite.dynamics.collocation import Fit, State, Status
-from vidsindy_lite.dynamics.frames import ShiftedLaw, cheapest, closed, with_fewer_axes
+from vidsindy_lite.dynamics.frames import ShiftedLaw, cheapest, closed
 from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.model import Form
 from vidsindy_lite.dynamics.problem import OFFSET_PENALTY, SURE, fit_curves, pose, term_penalties
@@ -25,28 +24,6 @@ def fit_of(problem, moving=(True, False)):
         np.array([0.5, 0.0]), np.array(moving),
     )  # fmt: skip
     return Fit(state, collocation, Status.CONVERGED)
-
-
-@pytest.mark.parametrize("moving", [(False, False), (True, False), (True, True)])
-def test_the_criterion_adds_the_prices(moving):
-    problem = posed(0.1)
-    fit = fit_of(problem, moving)
-    price = sum(problem.penalties[row] for row, _ in np.argwhere(fit.state.active))
-    price += sum(moving) * OFFSET_PENALTY * problem.penalties[0]
-    expected = fit.collocation.objective(fit.state) + price
-    assert problem.criterion(fit.collocation, fit.state) == pytest.approx(expected)
-
-
-def test_an_origin_comes_with_all_ways_of_giving_its_axes_back():
-    given, origin = np.array([0.0, 1.0, 2.0]), np.array([5.0, 1.0, 7.0])
-    problem = SimpleNamespace(origin=given)
-    variants = {(tuple(o), tuple(m)) for o, m in with_fewer_axes(problem, origin)}
-    assert variants == {
-        ((5, 1, 7), (True, False, True)),
-        ((5, 1, 2), (True, False, False)),
-        ((0, 1, 7), (False, False, True)),
-        ((0, 1, 2), (False, False, False)),
-    }
 
 
 @pytest.mark.parametrize("moving", [(False, False), (True, False), (False, True), (True, True)])

@@ -27,13 +27,6 @@ def test_noise_is_estimated_over_three_decades(sigma):
     np.testing.assert_allclose(estimate, sigma, rtol=0.1)
 
 
-def test_smoothing_removes_noise():
-    t, x = wave(800)
-    noisy = x + 0.2 * np.random.default_rng(3).normal(size=x.shape)
-    fitted = smooth([(t, noisy)], np.random.default_rng(0)).splines[0](t)
-    assert np.sqrt(np.mean((fitted - x) ** 2)) < 0.3 * 0.2
-
-
 def test_nothing_is_smoothed_across_a_gap():
     t = np.linspace(0, 1, 101)
     step = np.where(t < 0.5, 0.0, 1.0)[:, None]
@@ -55,16 +48,6 @@ def dense(band):
     """The matrix of a lower banded storage."""
     lower = sum(np.diag(row[: band.shape[1] - k], -k) for k, row in enumerate(band))
     return lower + np.tril(lower, -1).T
-
-
-def uneven(lengths, rng):
-    """Stretches of uneven times, and their grid with a knot at every sample."""
-    starts = 10.0 * np.arange(len(lengths))
-    times = [
-        low + np.cumsum(rng.uniform(0.5, 2, n)) for low, n in zip(starts, lengths, strict=True)
-    ]
-    stretches = [(t, rng.normal(size=(len(t), 2))) for t in times]
-    return stretches, Grid.of([Segment(t, x, t) for t, x in stretches])
 
 
 def test_few_samples_agree_with_dense_algebra():

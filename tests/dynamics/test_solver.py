@@ -2,18 +2,13 @@
 
 import numpy as np
 import pytest
-from helpers import posed
 from scipy.stats import kstest
 from threadpoolctl import threadpool_info, threadpool_limits
 from tqdm import tqdm
 
 from vidsindy_lite.dynamics import collocation, solver
 from vidsindy_lite.dynamics import path as paths
-from vidsindy_lite.dynamics.bspline import Segment
-from vidsindy_lite.dynamics.collocation import State
 from vidsindy_lite.dynamics.model import PolynomialSystem
-from vidsindy_lite.dynamics.path import FINAL_WEIGHT, History, polish
-from vidsindy_lite.dynamics.problem import fit_curves
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import (
     REFERENCE_OFFSET,
@@ -60,17 +55,6 @@ def test_noisy_systems_are_recovered(name):
     np.testing.assert_allclose(
         found.noise, 0.1 * np.std(truth.trajectory(1000)[1], axis=0), rtol=0.1
     )
-
-
-def test_law_in_the_data_frame_is_the_native_law_shifted():
-    _, t, x = measured("SprottF", 0.05)
-    found = discover(t, x)
-    shifted = found.native.shift(found.offset)
-    ours = dict(zip(shifted.terms, shifted.coefficients, strict=True))
-    for term, row, error in zip(
-        found.terms, found.coefficients, found.standard_errors, strict=True
-    ):
-        assert (np.abs(ours.get(term, 0.0) - row) <= 4 * error + 1e-6).all()
 
 
 PLANAR = {
@@ -165,14 +149,6 @@ def test_what_was_seen_in_a_row_counts(missing, noise):
     assert result.exact
     assert result.l2 < 1e-4 + noise / 5
     assert found.status == "ok"
-
-
-@pytest.mark.slow
-def test_missing_single_rows_are_no_gaps():
-    truth, t, x = measured("WangSun", 0.02)
-    x[np.random.default_rng(0).random(len(t)) < 0.3] = np.nan
-    found = discover(t, x)
-    assert score(found, truth).exact
 
 
 @pytest.mark.slow
@@ -370,19 +346,6 @@ def test_bad_degrees_are_refused(degree):
     _, t, x = measured("Lorenz", 0.0)
     with pytest.raises(ValueError, match="degree: must be"):
         discover(t, x, degree=degree)
-
-
-@pytest.mark.parametrize(("spacing", "halvings"), [(1.0, 1), (2.0, 2)])
-def test_knots_are_halved_until_that_changes_the_law_by_less_than_its_error(spacing, halvings):
-    problem = posed()
-    segments = [Segment.even(t, x, spacing, i) for i, (t, x) in problem.stretches]
-    grid = problem.collocation(segments)
-    law = np.array([[0, 0], [0, -1], [1, 0], [0, 0], [0, 0], [0, 0]], float)
-    state = State(fit_curves(grid, problem.curves), law, law != 0, np.zeros(2), np.zeros(2, bool))
-    fit = problem.weighted(grid, FINAL_WEIGHT).solve(state)
-    finer = polish(problem, fit, History())
-    spans = [len(s.breakpoints) - 1 for s in (*segments, *finer.collocation.segments)]
-    assert spans[1] == 2**halvings * spans[0]
 
 
 def test_a_term_that_is_worth_its_price_alone_is_kept():

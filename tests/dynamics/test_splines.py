@@ -11,7 +11,6 @@ from vidsindy_lite.dynamics.bspline import (
     Segment,
     clamped_knots,
     design_matrix,
-    local_basis,
 )
 
 
@@ -27,18 +26,6 @@ def test_agrees_with_scipy(count, order, seed):
     theirs = scipys.derivative(order)(t) if order else scipys(t)
     inside = ~np.isin(t, breakpoints) if order == 2 else np.ones(len(t), dtype=bool)
     np.testing.assert_allclose(ours[inside], theirs[inside], atol=1e-9 * (1 + abs(theirs).max()))
-
-
-def test_partition_of_unity_makes_the_offset_redundant():
-    knots = clamped_knots(np.linspace(0, 1, 6))
-    _, values = local_basis(knots, np.linspace(0, 1, 50))
-    np.testing.assert_allclose(values.sum(axis=1), 1)
-
-
-def test_ends_are_interpolated():
-    knots = clamped_knots([0.0, 1.0, 3.0])
-    assert design_matrix(knots, np.array([0.0]))[0, 0] == 1
-    assert design_matrix(knots, np.array([3.0]))[0, -1] == 1
 
 
 @pytest.mark.parametrize("breakpoints", [[1.0], [0.0, 0.0], [1.0, 0.0], [0.0, np.nan]])
