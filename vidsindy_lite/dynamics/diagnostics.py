@@ -20,21 +20,18 @@ from scipy.special import betaincc, chdtrc, chdtri
 from ..arrays import Bools, Floats, Ints
 from .collocation import CLEANEST, Fit, Linearisation, State, Status
 from .data import Trajectory, autocovariances, typical_step
-from .frames import free_offsets, freed
+from .frames import closed, free_offsets, freed, laws_at
 from .l0 import (
     LEAST,
-    closest_rival,
     far_neighbours,
-    minimiser,
     newcomers,
     prior_penalties,
-    subset_search,
 )
-from .library import monomial_exponents, monomials, shift_generators, shift_matrix, velocity_names
+from .library import monomial_exponents, monomials, shift_matrix, velocity_names
 from .mechanics import Complexes, Round, on_circle, on_sphere
 from .model import PolynomialSystem, place, spoken, sum_text
 from .noise import CONSISTENT, GROSS, passing, residual_noise
-from .problem import COARSE, Problem
+from .problem import COARSE, FINAL_WEIGHT, Problem
 from .result import Path
 
 # --------------------------------------------------------------------------------------------------
@@ -504,35 +501,36 @@ Rival = tuple[str, str, float]
 """Which other origin, along which axis, and by how much the criterion rises there."""
 
 
-def elsewhere(
-    problem: Problem, state: State, whole: Linearisation, law: PolynomialSystem
-) -> Iterator[Rival]:
+def elsewhere(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[Rival]:
     """Other laws that fit almost as well, with one free axis less or one more.
 
     Parameters
     ----------
     problem : Problem
         Its penalties.
-    state : State
-        Of the last fit.
-    whole : Linearisation
-        Around it, of all candidates and moving axes.
+    fit : Fit
+        The last one.
     law : PolynomialSystem
         The law in the frame of the data.
     """
-    # The offset stays where it is: with it free, the same law in another frame would count.
-    model = whole.of(problem.form.searched)
-    own = problem.penalty(state)
-    for axis, there in _neighbours(problem, state):
-        for value, rival in _cheapest_two(problem, state, model, there):
-            cost = value + problem.axis_penalty * there.moving.sum() - own
+    state, given = fit.state, problem.origin
+    axes = np.eye(problem.d, dtype=bool)[state.moving]
+    fewer = [(np.where(axis, given, state.offset), state.moving & ~axis) for axis in axes]
+    whole = closed(problem, fit, FINAL_WEIGHT)
+    every = problem.form.candidates | whole.state.active
+    whole = replace(whole, state=replace(whole.state, active=every))
+    own = problem.criterion(fit.collocation, state)
+    origins = [*fewer, *free_offsets(problem, state, problem.form.movable)]
+    for (origin, moving), laws in zip(origins, laws_at(problem, whole, origins), strict=True):
+        matrix = shift_matrix(problem.exponents, origin - given)
+        for cost, rival in ((one.criterion - own, one.state.coefficients) for one in laws):
             if not cost < 4.0:  # a likelihood ratio of 7 tells two laws apart
                 break  # the next costs more
-            matrix = shift_matrix(problem.exponents, rival.offset - problem.origin)
-            parts = np.abs(matrix) @ np.abs(rival.coefficients)
-            terms = (np.abs(matrix @ rival.coefficients) > VANISHED * parts) | (problem.known != 0)
+            parts = np.abs(matrix) @ np.abs(rival)
+            terms = (np.abs(matrix @ rival) > VANISHED * parts) | (problem.known != 0)
             if (terms != law.support).any():
-                where = ELSEWHERE if there.moving[axis] else "the origin of the data"
+                axis = int(np.argmax(moving != state.moving))
+                where = ELSEWHERE if moving[axis] else "the origin of the data"
                 yield where, problem.form.names[axis], cost
                 break
 
@@ -581,44 +579,6 @@ def untold_origins(found: Sequence[Rival], remedy: str) -> Iterator[str]:
         )
 
 
-def _neighbours(problem: Problem, state: State) -> Iterator[tuple[int, State]]:
-    """The same law with a free axis where the data have it, or one free that is not, and which."""
-    axes = np.eye(problem.d, dtype=bool)[state.moving]
-    fewer = [(np.where(axis, problem.origin, state.offset), state.moving & ~axis) for axis in axes]
-    for origin, moving in [*fewer, *free_offsets(problem, state, problem.form.movable)]:
-        moved = shift_matrix(problem.exponents, state.offset - origin) @ state.coefficients
-        axis = int(np.argmax(moving != state.moving))
-        yield axis, replace(state, coefficients=moved, offset=origin, moving=moving)
-
-
-def _cheapest_two(
-    problem: Problem, state: State, model: Linearisation, there: State
-) -> Iterator[tuple[float, State]]:
-    """The cheapest law around a state in another frame and its closest rival, with their costs."""
-    # The quadratic model around the law knows them: what a move does to polynomials is exact.
-    columns, size = problem.columns(there), state.coefficients.size
-    back = shift_matrix(problem.exponents, there.offset - state.offset)
-    axes = np.flatnonzero(there.moving)
-    rates = -shift_generators(problem.exponents)[axes] @ there.coefficients
-    changes = np.vstack([np.eye(size), rates.transpose(0, 2, 1).reshape(-1, size)])
-    changes = changes[np.append(problem.form.searched, np.arange(size, len(changes)))]
-    changes = (changes @ np.kron(np.eye(problem.d), back.T))[:, model.columns]
-    step = (back @ there.coefficients - state.coefficients).T.ravel()[model.columns]
-    pull, present = model.gradient - model.information @ step, there.flat()[columns]
-    quadratic = changes @ model.information @ changes.T, changes @ pull, present
-    risen = float(-step @ (model.gradient + pull))
-    penalties = np.append(problem.entry_penalties, np.full(problem.d, -np.inf))[columns]
-    start = (present != 0) | (columns >= size)
-    support, solution, value = subset_search(*quadratic, penalties, start)
-    flat = there.flat()
-    flat[columns] = solution
-    yield risen + value, there.moved(there.control_points, flat)
-    cost, dropped, added = closest_rival(*quadratic, penalties, support)
-    support[dropped], support[added] = False, True
-    flat[columns] = minimiser(*quadratic, support)
-    yield risen + value + cost, there.moved(there.control_points, flat)
-
-
 # --------------------------------------------------------------------------------------------------
 # All that is to be said of a law.
 
@@ -659,7 +619,7 @@ def diagnose(
         *_misfit(problem, fit, wider),
         *_unmet(problem, fit, law, remedy),
         *_contested(problem, fit.state, path, remedy),
-        *_rivals(problem, fit.state, model, wider, path, law, remedy, clean),
+        *_rivals(problem, fit, model, wider, path, law, remedy, clean),
         *_sampling(problem, law, remedy),
     )
 
@@ -833,13 +793,13 @@ def _range(low: float, high: float) -> str:
 
 
 def _rivals(
-    problem: Problem, state: State, model: Linearisation, wider: Wider, path: Path,
+    problem: Problem, fit: Fit, model: Linearisation, wider: Wider, path: Path,
     law: PolynomialSystem, remedy: str, clean: bool,
 ) -> Iterator[str]:  # fmt: skip
     """Do other terms or another origin explain the data as well?"""
     if clean and not problem.has_process_noise:
         return  # what is left is the error of the splines, not noise: it settles nothing
-    tolerant = clean or max(plateau.low for plateau in path.of(state.active)) > path.lowest
+    tolerant = clean or max(p.low for p in path.of(fit.state.active)) > path.lowest
     found = wider.beyond
     # Errors that last may follow the state, too; they are no reason to doubt, unless a single term,
     # or the few that a single coordinate has, explain nearly all of them.
@@ -850,10 +810,10 @@ def _rivals(
             "may be an approximation along these data, as of a sine or a drag; raise the degree, "
             "or name its terms with library="
         )
-    origins = list(pinned(problem, state, model, law, path.tolerated))
+    origins = list(pinned(problem, fit.state, model, law, path.tolerated))
     if not tolerant:  # weaker errors than those tolerated say nothing about the law
         yield from _far_neighbours(wider, remedy)
-        origins += elsewhere(problem.cautious, state, model, law)
+        origins += elsewhere(problem.cautious, fit, law)
     yield from untold_origins(origins, remedy)
 
 
