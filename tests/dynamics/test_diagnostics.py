@@ -276,7 +276,7 @@ def test_a_wrong_force_on_few_turns_is_not_taken_for_kicks_in_silence():
         "r": lambda x, y: np.array([x, y]),
     }
     found = discover(t, x, order=2, library=Library.terms(wrong))
-    words = r"kicked at random, which 3\.\d turns of \d+ samples each cannot tell from a drive or a"
+    words = r"process noise, which 3\.\d turns of \d+ samples each cannot tell from a drive or a"
     assert any(re.search(words, warning) for warning in found.warnings)
 
 

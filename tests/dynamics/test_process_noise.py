@@ -68,7 +68,7 @@ def test_error_bars_count_the_kicks_in(found_kicked):
 
 
 def test_kicks_are_printed_and_saved(found_kicked, tmp_path):
-    assert "kicked at random" in str(found_kicked)
+    assert "process noise: 0.0" in str(found_kicked)
     found_kicked.save(tmp_path / "law.json")
     again = vl.Discovery.load(tmp_path / "law.json")
     np.testing.assert_array_equal(again.model_error, found_kicked.model_error)
@@ -86,7 +86,7 @@ def test_errors_of_the_measurement_are_no_kicks(kind):
         x = x + 0.01 * x[:, ::-1] ** 2
     found = vl.discover(TIMES, x)
     assert not found.model_error.any()
-    assert "kicked" not in str(found)
+    assert "process noise" not in str(found)
     if kind != "bent space":
         assert exact(found, LAW)
 

@@ -862,7 +862,7 @@ def _sampling(problem: Problem, law: PolynomialSystem, remedy: str) -> Iterator[
     if problem.has_process_noise and (coarse or turns < 10):
         few = f"{turns:.1f} turns of {problem.samples_a_turn:.0f} samples each"
         yield (
-            f"the motion is taken for kicked at random, which {few} cannot tell from a drive or a "
+            f"the motion is taken to have process noise, which {few} cannot tell from a drive or a "
             f"force that nobody named: {'sample faster' if coarse else 'record longer'}, or name it"
         )
     # A body without a force moves evenly.

@@ -500,8 +500,8 @@ class Discovery:
             lines = [str(self.swing), "a law of its positions, one of many that fit alike:", *lines]
         if self.model_error.any():
             sizes = zip(self.model_error, self.system.names, strict=True)
-            kicks = ", ".join(f"{size:.2g} in {name}" for size, name in sizes if size)
-            lines.append(f"as if kicked at random, by {kicks} over a unit of time")
+            noise = ", ".join(f"{size:.2g} in {name}" for size, name in sizes if size)
+            lines.append(f"process noise: {noise} over a unit of time")
         if said := self.physics().headline:
             lines.append(said)
         if terms := list(unseen(self.native, self.offset, self.curves, self.absent)):
