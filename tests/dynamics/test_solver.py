@@ -1,4 +1,6 @@
-"""Discovery: exact recovery, its uncertainty, its warnings, bad input."""
+"""Discovery: exact recovery, its uncertainty, its warnings, bad input, threads."""
+
+from threading import Barrier, Thread
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from tqdm import tqdm
 from vidsindy_lite.dynamics import collocation, solver
 from vidsindy_lite.dynamics import path as paths
 from vidsindy_lite.dynamics.model import PolynomialSystem
-from vidsindy_lite.dynamics.solver import discover
+from vidsindy_lite.dynamics.solver import discover, one_blas_thread
 from vidsindy_lite.study import (
     REFERENCE_OFFSET,
     SYSTEMS,
@@ -373,3 +375,37 @@ def test_where_no_path_leads_to_a_law_one_that_tolerates_more_is_the_start():
     """A bend of space made terms at the errors first tolerated, and no path leads past them."""
     data = FlowContest("SprottF", "bent space 0.3 %", seed=51).data()
     assert score(discover(data.t, data.x, degree=data.degree), data.truth).exact
+
+
+# ------------------------------------------------------------------------------------------ threads
+
+
+def threads():
+    return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+
+def test_overlapping_limits_give_back_what_was_there():
+    began, second, within = Barrier(2), Barrier(2), []
+
+    def longer():
+        began.wait()
+        with one_blas_thread():
+            second.wait()  # the first one has ended
+            within.append(threads())
+
+    def first():
+        with one_blas_thread():
+            began.wait()
+            other.join(0.2)
+        second.wait()
+
+    with threadpool_limits(limits=2, user_api="blas"):
+        other = Thread(target=longer)
+        other.start()
+        first()
+        other.join()
+        assert threads() == {2}
+        with one_blas_thread():
+            assert threads() == {1}
+        assert threads() == {2}
+    assert within == [{1}]
