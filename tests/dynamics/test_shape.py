@@ -164,7 +164,7 @@ def test_terms_that_cancel_are_told():
 
 @pytest.mark.parametrize(
     ("name", "order"),
-    [("bob", 2), ("bob", 1), ("ellipse", 2), ("pendulum", 1), ("pendulum, angle", 2)],
+    [("bob", 2), ("ellipse", 2), ("pendulum", 1), ("pendulum, angle", 2)],
 )
 def test_a_law_on_a_shape_is_never_simply_ok(name, order):
     x, words = NAMED[name]

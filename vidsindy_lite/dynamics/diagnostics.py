@@ -492,8 +492,6 @@ def _higher(exponents: Ints, d: int, most: float) -> Ints:
 # An axis whose origin is that of the data is a claim: of all places in the box of the data it
 # would be just there. It is believed if the data hold it to be so likelier than chance makes it.
 
-ELSEWHERE = "another origin"
-"""That of a law is said to be elsewhere than where it was found."""
 VANISHED = 1e-6
 """What is left of a term in another frame, over the parts that cancel in it, if it vanishes."""
 
@@ -530,7 +528,7 @@ def elsewhere(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[Riv
             terms = (np.abs(matrix @ rival) > VANISHED * parts) | (problem.known != 0)
             if (terms != law.support).any():
                 axis = int(np.argmax(moving != state.moving))
-                where = ELSEWHERE if moving[axis] else "the origin of the data"
+                where = "another origin" if moving[axis] else "the origin of the data"
                 yield where, problem.form.names[axis], cost
                 break
 
@@ -558,7 +556,7 @@ def pinned(
         new = (np.abs(moved) > VANISHED * np.abs(moved).max(initial=0.0)) & ~law.support
         # Odds of 20 to 1: strong evidence by Kass and Raftery 1995.
         if state.moving.any() and new.any() and room - gain < 6.0:
-            yield ELSEWHERE, problem.form.names[axis], room - gain
+            yield "another origin", problem.form.names[axis], room - gain
 
 
 def untold_origins(found: Sequence[Rival], remedy: str) -> Iterator[str]:
