@@ -160,11 +160,8 @@ def _covariance(units: Units, fit: Fit, model: Linearisation) -> Floats:
     covariance[np.ix_(columns, columns)] = inverse(model.of(columns).information)
     factors = units.factors(fit.collocation.exponents)
     unit = np.concatenate([factors.T.ravel(), units.scale])
-    for entry, first in fit.state.followers():
-        covariance[entry] = covariance[first]
-    for entry, first in fit.state.followers():
-        covariance[:, entry] = covariance[:, first]
-    return covariance * (unit[:, None] * unit)
+    sources = fit.state.sources
+    return covariance[np.ix_(sources, sources)] * (unit[:, None] * unit)
 
 
 def _shifted(exponents: Ints, coefficients: Floats, offset: Floats) -> tuple[Floats, Floats]:
