@@ -261,10 +261,7 @@ def check_orientation(orientation: str, library: Library, d: int, origin: str) -
 
 
 def in_sparsest_axes(
-    own: Discovery,
-    pose: Callable[[Floats], Problem],
-    solve: Callable[[Floats], Solved],
-    rng: np.random.Generator,
+    own: Discovery, problem: Problem, solve: Callable[[Floats], Solved], rng: np.random.Generator
 ) -> Solved | None:
     """The law in the axes in which it has fewest terms; none if in no others it has fewer.
 
@@ -272,25 +269,25 @@ def in_sparsest_axes(
     ----------
     own : Discovery
         In the axes of the data.
-    pose, solve : callable
-        The problem, and its solution, in axes that are the rows of (m, m).
+    problem : Problem
+        In these, of places that were seen whole.
+    solve : callable
+        The solution in axes that are the rows of (m, m).
     rng : numpy.random.Generator
         For the starts of the search.
     """
-    starts = rough_orientations(pose(np.eye(own.system.states // own.system.order)), rng)
-    best = min((_settled(turn, solve) for turn in starts), key=_rank, default=None)
+    settled = (_settled(turn, solve) for turn in rough_orientations(problem, rng))
+    best = min(settled, key=_rank, default=None)
     return best if best and _terms(best[0]) < _terms(own) else None
 
 
 def _settled(turn: Floats, solve: Callable[[Floats], Solved]) -> Solved:
     """The law in the best axes near some; of laws alike, the one in the axes that were refined."""
     solved = best = solve(turn)
-    best = replace(best[0], orientation=turn), *best[1:]
     for _ in range(3):  # each law tells the axes better, in which the next is made
         turn, before = refined(*solved[1:]) @ turn, _rank(solved)
         solved = solve(turn)
-        if _rank(solved) <= _rank(best):
-            best = replace(solved[0], orientation=turn), *solved[1:]
+        best = solved if _rank(solved) <= _rank(best) else best
         if _rank(solved) >= before:
             break
     return best
