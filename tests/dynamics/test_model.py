@@ -126,13 +126,6 @@ def test_shift_moves_the_argument_and_comes_back(law, seed):
     np.testing.assert_allclose(shifted.shift(-offset)(x), law(x), atol=1e-9)
 
 
-def test_shift_agrees_with_simulation():
-    law, offset = PolynomialSystem.from_terms(LORENZ), np.array([10.0, 10.0, 0.0])
-    t, x0 = np.linspace(0, 1, 50), np.array([-8.0, 7.0, 27.0])
-    moved = law.shift(offset).simulate(t, x0 + offset)
-    np.testing.assert_allclose(moved, law.simulate(t, x0) + offset, atol=1e-7)
-
-
 def test_shift_leaves_no_remainder_where_terms_cancel():
     law = PolynomialSystem.from_terms({"x": {"x": -10, "y": 10}, "y": {"y": -0.1}})
     shifted = law.shift((0.3, 0.3))
@@ -157,19 +150,6 @@ def test_closure_holds_all_divisors():
     widened = divides(exponents) @ support
     assert widened[:, 1].tolist() == [True, True, True, False, True, False]
     assert not widened[:, 0].any()
-
-
-def test_simulation_of_a_decay_is_the_exponential():
-    law = PolynomialSystem.from_terms({"x": {"x": -2}})
-    t = np.linspace(0, 3, 20)
-    np.testing.assert_allclose(law.simulate(t, [1.5])[:, 0], 1.5 * np.exp(-2 * t), rtol=1e-9)
-
-
-def test_simulation_says_nan_after_a_blow_up():
-    law = PolynomialSystem.from_terms({"x": {"x^2": 1}})
-    x = law.simulate(np.linspace(0, 2, 21), [1.0])  # infinite at t = 1
-    assert np.isfinite(x[:9]).all()
-    assert np.isnan(x[11:]).all()
 
 
 @pytest.mark.parametrize(

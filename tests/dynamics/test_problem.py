@@ -83,15 +83,6 @@ def test_prices_are_dearer_for_rivals_and_where_all_samples_share_errors():
         np.testing.assert_array_equal(problem.penalties, sure)
 
 
-def test_turns_and_samples_are_those_of_all_runs():
-    problem = posed()
-    (t, _), *_ = problem.trajectories
-    twice = replace(problem, trajectories=2 * problem.trajectories)
-    assert problem.turns == pytest.approx((t[-1] - t[0]) / (2 * np.pi))
-    assert twice.turns == pytest.approx(2 * problem.turns)
-    assert twice.samples_a_turn == pytest.approx(len(t) / problem.turns)
-
-
 # ----------------------------------------------------------------------------------- standard units
 
 

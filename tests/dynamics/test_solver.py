@@ -8,8 +8,7 @@ from scipy.stats import kstest
 from threadpoolctl import threadpool_info, threadpool_limits
 from tqdm import tqdm
 
-from vidsindy_lite.dynamics import collocation, solver
-from vidsindy_lite.dynamics import path as paths
+from vidsindy_lite.dynamics import solver
 from vidsindy_lite.dynamics.model import PolynomialSystem
 from vidsindy_lite.dynamics.solver import discover, one_blas_thread
 from vidsindy_lite.study import (
@@ -299,18 +298,6 @@ def test_pure_noise_gives_no_law_without_a_warning():
     x = np.random.default_rng(0).normal(size=(400, 2))
     found = discover(np.arange(400.0), x)
     assert found.status == "suspect"
-
-
-def test_a_last_fit_that_did_not_converge_is_told(monkeypatch):
-    terms, x0, duration = PLANAR["growth"]
-    t = np.linspace(0, duration, 300)
-    x = PolynomialSystem.from_terms(terms).simulate(t, x0)
-    x = add_noise(x, 0.02, np.random.default_rng(0))
-    assert discover(t, x).status == "ok"
-    monkeypatch.setattr(paths, "EXACT", -1.0)  # which no step can promise
-    monkeypatch.setattr(collocation, "NEARLY", -1.0)
-    monkeypatch.setattr(collocation, "FAITHFUL", 0.0)
-    assert any("the last fit did not converge" in text for text in discover(t, x).warnings)
 
 
 # -- input ---------------------------------------------------------------------------------------
