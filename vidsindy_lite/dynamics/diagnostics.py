@@ -519,11 +519,13 @@ def elsewhere(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[Riv
     whole = replace(whole, state=replace(whole.state, active=every))
     own = problem.criterion(fit.collocation, state)
     origins = [*fewer, *free_offsets(problem, state, problem.form.movable)]
-    for (origin, moving), laws in zip(origins, laws_at(problem, whole, origins), strict=True):
-        matrix = shift_matrix(problem.exponents, origin - given)
-        for cost, rival in ((one.criterion - own, one.state.coefficients) for one in laws):
+    found = laws_at(problem, whole, origins, free=True)
+    for (_, moving), laws in zip(origins, found, strict=True):
+        for one in laws:
+            cost, rival = one.criterion - own, one.state.coefficients
             if not cost < 4.0:  # a likelihood ratio of 7 tells two laws apart
                 break  # the next costs more
+            matrix = shift_matrix(problem.exponents, one.state.offset - given)
             parts = np.abs(matrix) @ np.abs(rival)
             terms = (np.abs(matrix @ rival) > VANISHED * parts) | (problem.known != 0)
             if (terms != law.support).any():
