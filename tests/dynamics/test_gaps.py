@@ -29,11 +29,6 @@ def pieces():
     return trajectories, segments, splines
 
 
-def test_gaps_are_within_one_trajectory():
-    _, segments, _ = pieces()
-    assert gaps(segments) == [(0, 2.0)]
-
-
 def test_a_law_carries_the_curve_across_the_gap():
     trajectories, segments, splines = pieces()
     joined, curves = join(data(*trajectories), segments, splines, CIRCLE, [(0, 2.0)])
@@ -42,14 +37,6 @@ def test_a_law_carries_the_curve_across_the_gap():
     t = np.linspace(2, 3, 40)
     exact = np.stack([np.sin(t), np.cos(t)], axis=1)
     np.testing.assert_allclose(curves[0](t), exact, atol=1e-5)
-
-
-def test_gaps_that_are_not_named_stay_open():
-    trajectories, segments, splines = pieces()
-    joined, curves = join(data(*trajectories), segments, splines, CIRCLE, [])
-    assert joined == segments
-    for segment, curve, spline in zip(segments, curves, splines, strict=True):
-        np.testing.assert_array_equal(curve(segment.t), spline(segment.t))
 
 
 def test_a_law_that_blows_up_in_a_gap_leaves_the_curve_finite():
@@ -84,12 +71,3 @@ def test_both_sides_are_blended_linearly_across_the_gap():
     np.testing.assert_allclose(curve(inside), exact, atol=1e-5)
     outside = np.array([1.5, 4.5])
     np.testing.assert_allclose(curve(outside), [splines[0](1.5), splines[1](4.5)])
-
-
-def test_a_joined_segment_holds_what_was_measured_in_the_gap():
-    trajectories, segments, splines = pieces()
-    problem = data(*trajectories, spacing=0.25)
-    joined, _ = join(problem, segments, splines, CIRCLE, [(0, 2.0)])
-    assert joined[0].t[[0, -1]].tolist() == [0.0, 6.0]
-    np.testing.assert_array_equal(joined[0].t, trajectories[0][0])
-    assert np.diff(joined[0].breakpoints).max() <= 0.25 + 1e-12

@@ -79,8 +79,6 @@ def discovered(**environment):
 def test_a_kernel_of_linear_algebra_does_not_count():
     plain = discovered()
     haswell = discovered(OPENBLAS_CORETYPE="Haswell", OMP_NUM_THREADS="2")
-    prescott = discovered(OPENBLAS_CORETYPE="Prescott", OMP_NUM_THREADS="1")
     assert len(plain) == len(CASES)
-    for (coefficients, errors), *others in zip(plain, haswell, prescott, strict=True):
-        for found, _ in others:
-            assert_same(coefficients, errors, found)
+    for (coefficients, errors), (found, _) in zip(plain, haswell, strict=True):
+        assert_same(coefficients, errors, found)

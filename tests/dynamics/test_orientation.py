@@ -5,7 +5,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import vidsindy_lite as vl
-from vidsindy_lite.dynamics import orientation, solver
 from vidsindy_lite.dynamics.l0 import inverse
 from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.orientation import (
@@ -139,7 +138,7 @@ def test_axes_that_the_terms_leave_open_are_a_choice_and_no_error():
 def test_error_bars_of_a_turned_law_are_honest():
     """95 % intervals of its coefficients hold the truth nine times in ten."""
     law, pulls = SYSTEMS["Lorenz"], []
-    for seed in range(8):
+    for seed in range(4):
         t, x, axes = askew("Lorenz", seed, 0.01)
         found = vl.discover(t, x, degree=2, order=1, orientation="learn")
         turn = np.rint(found.orientation @ axes.T)  # which of the law's axes they are
@@ -150,29 +149,6 @@ def test_error_bars_of_a_turned_law_are_honest():
         missed = (found.coefficients - truth)[wanted]
         pulls += np.abs(missed / found.standard_errors[wanted]).tolist()
     assert np.mean(np.array(pulls) < 1.96) >= 0.9
-
-
-def test_axes_are_refined_only_for_a_law_that_is_then_sought(monkeypatch):
-    calls = []
-
-    def counted(module, name):
-        used = getattr(module, name)
-        monkeypatch.setattr(module, name, lambda *given: calls.append(name) or used(*given))
-
-    starts = orientation.rough_orientations
-    monkeypatch.setattr(
-        orientation,
-        "rough_orientations",
-        lambda *given: calls.append("start") or starts(*given)[:1],
-    )
-    counted(orientation, "refined")
-    counted(solver, "_solved")
-    law, t = vl.PolynomialSystem.from_terms(DUFFING), np.linspace(0, 20, 300)
-    x = law.simulate(t, [1.5, 0.4]) @ turned(np.array([0.5]), 2)
-    vl.discover(t, x, order=1, orientation="learn")
-    assert calls[:3] == ["_solved", "start", "_solved"]
-    assert calls[3:] == ["refined", "_solved"] * (len(calls) // 2 - 1)
-    assert len(calls) >= 5
 
 
 def test_where_no_axes_are_better_those_of_the_data_stay():

@@ -1,18 +1,26 @@
-"""A posed problem: its knots, penalties, weights, and what a candidate for its law costs."""
+"""A posed problem: its units and penalties, what a law costs, and what of it is told from zero."""
 
 from dataclasses import replace
 from itertools import product
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from helpers import posed
 
 from vidsindy_lite.dynamics.collocation import Fit, State, Status
-from vidsindy_lite.dynamics.frames import ShiftedLaw, cheapest, closed, with_fewer_axes
-from vidsindy_lite.dynamics.library import Library
+from vidsindy_lite.dynamics.frames import ShiftedLaw, cheapest, closed
+from vidsindy_lite.dynamics.inference import _pruned, infer
+from vidsindy_lite.dynamics.library import Library, monomial_exponents
 from vidsindy_lite.dynamics.model import Form
-from vidsindy_lite.dynamics.problem import OFFSET_PENALTY, SURE, fit_curves, pose, term_penalties
+from vidsindy_lite.dynamics.path import FINAL_WEIGHT, LARGEST, History, follow
+from vidsindy_lite.dynamics.problem import (
+    GAP,
+    OFFSET_PENALTY,
+    SURE,
+    fit_curves,
+    pose,
+    term_penalties,
+)
 from vidsindy_lite.study import SYSTEMS
 
 
@@ -25,28 +33,6 @@ def fit_of(problem, moving=(True, False)):
         np.array([0.5, 0.0]), np.array(moving),
     )  # fmt: skip
     return Fit(state, collocation, Status.CONVERGED)
-
-
-@pytest.mark.parametrize("moving", [(False, False), (True, False), (True, True)])
-def test_the_criterion_adds_the_prices(moving):
-    problem = posed(0.1)
-    fit = fit_of(problem, moving)
-    price = sum(problem.penalties[row] for row, _ in np.argwhere(fit.state.active))
-    price += sum(moving) * OFFSET_PENALTY * problem.penalties[0]
-    expected = fit.collocation.objective(fit.state) + price
-    assert problem.criterion(fit.collocation, fit.state) == pytest.approx(expected)
-
-
-def test_an_origin_comes_with_all_ways_of_giving_its_axes_back():
-    given, origin = np.array([0.0, 1.0, 2.0]), np.array([5.0, 1.0, 7.0])
-    problem = SimpleNamespace(origin=given)
-    variants = {(tuple(o), tuple(m)) for o, m in with_fewer_axes(problem, origin)}
-    assert variants == {
-        ((5, 1, 7), (True, False, True)),
-        ((5, 1, 2), (True, False, False)),
-        ((0, 1, 7), (False, False, True)),
-        ((0, 1, 2), (False, False, False)),
-    }
 
 
 @pytest.mark.parametrize("moving", [(False, False), (True, False), (False, True), (True, True)])
@@ -97,10 +83,75 @@ def test_prices_are_dearer_for_rivals_and_where_all_samples_share_errors():
         np.testing.assert_array_equal(problem.penalties, sure)
 
 
-def test_turns_and_samples_are_those_of_all_runs():
+# ----------------------------------------------------------------------------------- standard units
+
+
+def test_data_are_in_standard_units():
     problem = posed()
-    (t, _), *_ = problem.trajectories
-    twice = replace(problem, trajectories=2 * problem.trajectories)
-    assert problem.turns == pytest.approx((t[-1] - t[0]) / (2 * np.pi))
-    assert twice.turns == pytest.approx(2 * problem.turns)
-    assert twice.samples_a_turn == pytest.approx(len(t) / problem.turns)
+    ((t, x),) = problem.trajectories
+    np.testing.assert_allclose(x.mean(axis=0), 0, atol=1e-12)
+    np.testing.assert_allclose(x.std(axis=0), 1)
+    (measured,) = problem.measured
+    np.testing.assert_allclose(problem.units.point(x), measured[1])
+    np.testing.assert_allclose(problem.units.standard(measured[1]), x, atol=1e-12)
+    np.testing.assert_allclose(t * problem.units.time, measured[0])
+    speed = np.sqrt((np.gradient(x, t, axis=0) ** 2).mean())
+    assert speed == pytest.approx(1, rel=0.02)
+    np.testing.assert_allclose(problem.systematic[0][0, :, 0], 1 / measured[1].std(axis=0))
+    np.testing.assert_allclose(problem.origin, -measured[1].mean(axis=0) / measured[1].std(axis=0))
+
+
+def test_a_pause_is_a_gap_if_the_target_moves_far_in_it():
+    step = posed().units.time * GAP / 0.05  # samples in the longest pause that is none
+    for missing, stretches in ((int(step) - 2, 1), (int(step) + 2, 2)):
+        seen = np.r_[0:150, 150 + missing : 401]
+        assert len(posed(seen=seen).stretches) == stretches
+
+
+# ----------------------------------------------------------------- the law in the frame of the data
+
+
+def pruned(coefficients, covariance, penalties):
+    """A law of one variable around the data's own origin, pruned."""
+    law = np.array(coefficients, float)[:, None]
+    padded = np.pad(np.array(covariance, float), (0, 1))
+    return _pruned(monomial_exponents(1, len(law) - 1), law, np.zeros(1), padded, penalties)
+
+
+def test_pruning_conditions_on_zero():
+    kept, left = pruned([0.5, 20.0], [[1.0, 0.8], [0.8, 4.0]], np.array([9.0, 9.0]))
+    assert kept[0, 0] == 0
+    assert kept[1, 0] == pytest.approx(20.0 - 0.8 * 0.5)
+    assert left[1, 1] == pytest.approx(4.0 - 0.8**2)
+    assert not left[0].any()
+
+
+def test_what_no_shift_has_changed_stays_however_large_the_errors_that_are_tolerated():
+    problem = posed(0.1)
+    law = np.array([[0, 0], [0, -1], [1, 0], [0, 0], [0, 0], [0, 0]], float)
+    grid = problem.collocation(problem.segments())
+    control = fit_curves(grid, problem.curves)
+    state = State(control, law, law != 0, problem.origin, np.zeros(2, dtype=bool))
+    fit = problem.weighted(grid, FINAL_WEIGHT).solve(state)
+    path = follow(problem, fit)
+    tolerant = tuple(
+        tuple(replace(plateau, low=LARGEST) for plateau in plateaus) for plateaus in path.plateaus
+    )
+    found = infer(problem, fit, path.model, replace(path, plateaus=tolerant), History())
+    assert (found.system.support == found.native.support).all()
+
+
+@pytest.mark.parametrize("distance", [0.3, 2.9, 3.1, 6.0])
+def test_the_square_of_an_origin_is_as_far_from_zero_as_the_origin(distance):
+    """x' = x^2 y around an origin that is so many standard errors from that of the data."""
+    exponents, error = monomial_exponents(2, 3), 1e-3
+    rows = exponents.tolist()
+    own, cross, square = (rows.index(powers) for powers in ([2, 1], [1, 1], [0, 1]))
+    law, offset = np.zeros((len(rows), 2)), np.array([distance * error, 0.0])
+    law[own, 0] = 1.0
+    covariance = np.zeros((law.size + 2,) * 2)
+    covariance[own, own], covariance[law.size, law.size] = 1e-8, error**2
+    kept, _ = _pruned(exponents, law, offset, covariance, np.full(law.size, 9.0))
+    assert kept[own, 0] == pytest.approx(1.0)
+    shifted = [0.0, 0.0] if distance < 3 else [-2 * offset[0], offset[0] ** 2]
+    assert kept[[cross, square], 0] == pytest.approx(shifted, abs=0.0)

@@ -1,19 +1,15 @@
 """A kicked motion is told from a badly measured one, and its law is found all the same."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from helpers import dependent, posed
+from helpers import dependent
 
 import vidsindy_lite as vl
-from vidsindy_lite.dynamics import PolynomialSystem, solver
+from vidsindy_lite.dynamics import PolynomialSystem
 from vidsindy_lite.dynamics.bspline import Segment
 from vidsindy_lite.dynamics.collocation import Collocation, Fit, State, Status
-from vidsindy_lite.dynamics.inference import _kicks
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.noise import evidence
-from vidsindy_lite.dynamics.path import first_law
 
 LAW = PolynomialSystem.from_terms(
     {"x": {"y": 1.0}, "y": {"x": -1.0, "y": 1.0, "x^2 y": -1.0}}, degree=3
@@ -49,25 +45,9 @@ def test_law_of_a_kicked_motion_is_found(found_kicked):
     assert found_kicked.status == "ok"
 
 
-def test_no_law_is_searched_at_larger_errors_where_the_motion_is_kicked(monkeypatch):
-    searched = []
-
-    def counted(*given):
-        searched.append(given)
-        return first_law(*given)
-
-    monkeypatch.setattr(solver, "first_law", counted)
-    rng = np.random.default_rng(11)
-    x = kicked(LAW, [2.0, 0.0], TIMES, 0.2, rng)
-    found = vl.discover(TIMES, x + 0.002 * rng.standard_normal(x.shape), order=1)
-    assert exact(found, LAW)
-    assert len(searched) == 2  # before kicks, and under them
-
-
-@pytest.mark.parametrize("seed", [2, 3])
-def test_errors_that_a_poor_law_leaves_are_not_taken_for_kicks(seed):
+def test_errors_that_a_poor_law_leaves_are_not_taken_for_kicks():
     """The first law shows kicks; the one that is found under them holds exactly."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(3)
     x = LAW.simulate(TIMES, np.array([2.0, 0.0])) + 0.2 * dependent(rng, len(TIMES), 0.97)
     found = vl.discover(TIMES, x, order=1)
     assert exact(found, LAW)
@@ -80,20 +60,6 @@ def test_kicks_are_as_large_as_they_were(found_kicked):
     assert (found_kicked.noise < 0.05 * np.sqrt(TIMES[1])).all()
 
 
-def test_kicks_add_up_over_the_samples_of_a_unit_of_time():
-    """What a sample misses is a rate; over its step that is a kick, and kicks add in squares."""
-    problem = replace(posed(seen=slice(100, None)), process_noise=np.array([0.2, 0.03]))
-    collocation = problem.collocation(problem.segments())
-    nothing = np.zeros((6, 2))
-    state = State(
-        np.zeros((collocation.grid.r, 2)), nothing, nothing != 0, np.zeros(2), np.zeros(2, bool)
-    )
-    kicks = _kicks(problem, Fit(state, collocation, Status.CONVERGED))
-    units, step = problem.units, 15 / 301  # the data last from 5 to 20
-    of_a_step = problem.process_noise * units.scale / units.time * step
-    np.testing.assert_allclose(kicks, of_a_step * np.sqrt(1 / step))
-
-
 def test_error_bars_count_the_kicks_in(found_kicked):
     kept = LAW.support
     off = (found_kicked.coefficients - LAW.coefficients)[kept]
@@ -101,17 +67,10 @@ def test_error_bars_count_the_kicks_in(found_kicked):
 
 
 def test_kicks_are_printed_and_saved(found_kicked, tmp_path):
-    assert "kicked at random" in str(found_kicked)
+    assert "process noise: 0.0" in str(found_kicked)
     found_kicked.save(tmp_path / "law.json")
     again = vl.Discovery.load(tmp_path / "law.json")
     np.testing.assert_array_equal(again.model_error, found_kicked.model_error)
-
-
-def lasting(n, d, correlation, rng):
-    errors = rng.standard_normal((n, d))
-    for i in range(1, n):
-        errors[i] = correlation * errors[i - 1] + np.sqrt(1 - correlation**2) * errors[i]
-    return errors
 
 
 @pytest.mark.parametrize("kind", ["independent", "lasting", "bent space"])
@@ -121,12 +80,12 @@ def test_errors_of_the_measurement_are_no_kicks(kind):
     if kind == "independent":
         x = x + 0.05 * rng.standard_normal(x.shape)
     elif kind == "lasting":
-        x = x + 0.05 * lasting(*x.shape, 0.9, rng)
+        x = x + 0.05 * dependent(rng, len(x), 0.9)
     else:
         x = x + 0.01 * x[:, ::-1] ** 2
     found = vl.discover(TIMES, x)
     assert not found.model_error.any()
-    assert "kicked" not in str(found)
+    assert "process noise" not in str(found)
     if kind != "bent space":
         assert exact(found, LAW)
 

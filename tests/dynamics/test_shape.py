@@ -71,10 +71,9 @@ def test_a_shape_is_named(name, share):
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.05, 0.2])
-@pytest.mark.parametrize("length", [400, 1500])
 @pytest.mark.parametrize("name", SYSTEMS)
-def test_flows_are_on_no_shape(name, length, share):
-    t, x = SYSTEMS[name].trajectory(length)
+def test_flows_are_on_no_shape(name, share):
+    t, x = SYSTEMS[name].trajectory(600)
     x = x / x.std(axis=0)
     assert told(x, max(share, 1e-5), t=t, terms=10) == ""
 
@@ -103,12 +102,6 @@ def test_an_orbit_that_shrinks_or_is_rich_is_not_too_plain():
     cycle = solved(lambda _, s: [s[1], -s[0] + 1.5 * (1 - s[0] ** 2) * s[1]], [1, 0], 5 * TIMES)
     assert told(cycle[300:], t=TIMES[300:] * 5, terms=3) == ""
     assert "closed orbit" in told(cycle[300:], t=TIMES[300:] * 5, terms=30)
-
-
-def test_a_centre_has_no_more_digits_than_its_error():
-    words = told(NAMED["bob that swings aside"][0])
-    centre = [part.split(" +-")[0] for part in words.split("centre ")[1].split(";")[0].split(", ")]
-    assert all(len(part) <= len("-0.00012") and "e" not in part for part in centre)
 
 
 @pytest.mark.parametrize("start", [(0.5, 1.2), (0.8, 1.0)])
@@ -171,7 +164,7 @@ def test_terms_that_cancel_are_told():
 
 @pytest.mark.parametrize(
     ("name", "order"),
-    [("bob", 2), ("bob", 1), ("ellipse", 2), ("pendulum", 1), ("pendulum, angle", 2)],
+    [("bob", 2), ("ellipse", 2), ("pendulum", 1), ("pendulum, angle", 2)],
 )
 def test_a_law_on_a_shape_is_never_simply_ok(name, order):
     x, words = NAMED[name]
@@ -185,14 +178,6 @@ def test_a_coordinate_that_is_given_twice_is_named_without_a_factor_of_one():
     x = np.stack([np.cos(t), np.sin(t), np.cos(t)], axis=1)
     told = " ".join(shapes([(t, x)], np.full(3, 1e-6), ("x", "y", "z"), np.zeros(3, dtype=int)))
     assert "(x - z = 0)" in told or "(z - x = 0)" in told
-
-
-def test_terms_that_cancel_beyond_counting_are_told_in_few_digits():
-    law = PolynomialSystem.from_terms({"x": {"x": 1, "y": -1}, "y": {"x": 1}}, degree=1)
-    line = np.linspace(-1, 1, 50)
-    (told,) = cancelling(law, np.stack([line, line], axis=1))
-    assert "times their sum)" in told
-    assert max(map(len, told.split())) < 20
 
 
 def test_laps_that_differ_by_their_noise_are_laps():

@@ -318,43 +318,29 @@ def normal_band(rows: sparse.csr_array, weights: Floats | None = None, alike: in
     return band
 
 
-def solve_factored(factor: Floats, right: Floats, block: int = 48, held: int = 400) -> None:
+def solve_factored(factor: Floats, right: Floats, block: int = 48) -> None:
     """Solve ``L L' x = right`` for many right-hand sides, (n, m), in their place.
 
     ``L`` is in lower banded storage. LAPACK takes one right-hand side after the other; block by
-    block, of so many rows at least, all of them at once are three times as fast. The triangles of
-    so many blocks are held at once.
+    block, of so many rows at least, all of them at once are three times as fast.
     """
     reach, n = len(factor) - 1, len(right)
     size = max(block, 2 * reach)
     blocks = [right[start : start + size] for start in range(0, n, size)]
-    last, parts = len(blocks) - 1, range(0, len(blocks), held)
-
-    def unrolled(part: int) -> list[tuple[int, Floats, Floats, Floats]]:
-        """Blocks of a part: number, triangle, what reaches on to the next, and right-hand side."""
-        rows = _unrolled(factor[:, part * size : (part + held) * size], size)
-        numbered = enumerate(zip(rows, blocks[part : part + held], strict=True), part)
-        return [
-            (k, row[: len(here), : len(here)].T, row[size + 1 - reach :, :reach], here)
-            for k, (row, here) in numbered
-        ]
-
-    there: list[tuple[int, Floats, Floats, Floats]] = []
-    for part in parts:
-        there = unrolled(part)
-        for k, triangle, onward, here in there:
-            dtrsm(1.0, triangle, here.T, 1, 1, 1, overwrite_b=1)
-            if k < last:
-                after = blocks[k + 1][:reach]
-                after -= onward.T[: len(after)] @ here[-reach:]
-    for part in reversed(parts):
-        if part != parts[-1]:
-            there = unrolled(part)
-        for k, triangle, onward, here in reversed(there):
-            if k < last:
-                after = blocks[k + 1][:reach]
-                here[-reach:] -= onward[:, : len(after)] @ after
-            dtrsm(1.0, triangle, here.T, 1, 1, overwrite_b=1)
+    rows = _unrolled(factor, size)
+    triangles = [row[: len(here), : len(here)].T for row, here in zip(rows, blocks, strict=True)]
+    onward, last = rows[:, size + 1 - reach :, :reach], len(blocks) - 1
+    for k, here in enumerate(blocks):
+        dtrsm(1.0, triangles[k], here.T, 1, 1, 1, overwrite_b=1)
+        if k < last:
+            after = blocks[k + 1][:reach]
+            after -= onward[k, :, : len(after)].T @ here[-reach:]
+    for k in range(last, -1, -1):
+        here = blocks[k]
+        if k < last:
+            after = blocks[k + 1][:reach]
+            here[-reach:] -= onward[k, :, : len(after)] @ after
+        dtrsm(1.0, triangles[k], here.T, 1, 1, overwrite_b=1)
 
 
 def _unrolled(factor: Floats, size: int) -> Floats:

@@ -71,31 +71,30 @@ class State:
         """Coefficients, equation by equation, then the offset."""
         return np.concatenate([self.coefficients.T.ravel(), self.offset])
 
+    @property
+    def sources(self) -> Ints:
+        """Of each entry of `flat`, whose value it has."""
+        sources = np.arange(self.coefficients.size + len(self.offset))
+        if self.shared is not None:
+            sources[: len(self.shared)] = self.shared
+        return sources
+
     def free(self) -> Bools:
         """Which entries of `flat` are unknowns: of those that share a value, the first."""
-        free = np.concatenate([self.active.T.ravel(), self.moving])
-        free[[entry for entry, _ in self.followers()]] = False
-        return free
-
-    def followers(self) -> list[tuple[int, int]]:
-        """Entries of `flat` that have the value of another, and which."""
-        if self.shared is None:
-            return []
-        entries = np.flatnonzero(self.shared != np.arange(len(self.shared)))
-        return [(int(entry), int(self.shared[entry])) for entry in entries]
+        sources = self.sources
+        own = sources == np.arange(len(sources))
+        return own & np.concatenate([self.active.T.ravel(), self.moving])
 
     def whole(self, active: Bools) -> Bools:
         """Terms, (l, d), with all that share a value with one of them."""
-        if self.shared is None:
-            return active
-        count = np.bincount(self.shared, active.T.ravel(), len(self.shared))
-        return np.asarray(count[self.shared] > 0).reshape(active.T.shape).T
+        sources = self.sources[: active.size]
+        count = np.bincount(sources, active.T.ravel(), active.size)
+        return np.asarray(count[sources] > 0).reshape(active.T.shape).T
 
     def moved(self, control_points: Floats, flat: Floats) -> State:
         """The same terms with another curve and other entries of `flat`."""
-        l, d = self.coefficients.shape
-        values, offset = flat[: l * d], flat[l * d :]
-        coefficients = (values if self.shared is None else values[self.shared]).reshape(d, l).T
+        values, offset = np.split(flat[self.sources], [self.coefficients.size])
+        coefficients = values.reshape(self.coefficients.T.shape).T
         return replace(
             self, control_points=control_points, coefficients=coefficients, offset=offset
         )
@@ -453,9 +452,10 @@ class Collocation:
         for j in range(d):
             here = np.flatnonzero(term_columns // l == j)
             unknowns[:, j, 1 + here] = -root[:, j, None] * terms[:, term_columns[here] % l]
-        for entry, first in state.followers():
+        sources = state.sources
+        for entry in np.flatnonzero(sources != np.arange(len(sources))).tolist():
             j, k = divmod(entry, l)
-            place = np.flatnonzero(term_columns == first)
+            place = np.flatnonzero(term_columns == sources[entry])
             unknowns[:, j, 1 + place] = -root[:, j, None] * terms[:, [k]]
         unknowns[:, :, 1 + count : 1 + size] = jacobian[:, :, offset_columns]
         return self.grid.physics(root * below, jacobian), unknowns.reshape(-1, unknowns.shape[-1])

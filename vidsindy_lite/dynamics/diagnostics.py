@@ -20,21 +20,18 @@ from scipy.special import betaincc, chdtrc, chdtri
 from ..arrays import Bools, Floats, Ints
 from .collocation import CLEANEST, Fit, Linearisation, State, Status
 from .data import Trajectory, autocovariances, typical_step
-from .frames import free_offsets, freed
+from .frames import closed, free_offsets, freed, laws_at
 from .l0 import (
     LEAST,
-    closest_rival,
     far_neighbours,
-    minimiser,
     newcomers,
     prior_penalties,
-    subset_search,
 )
-from .library import monomial_exponents, monomials, shift_generators, shift_matrix, velocity_names
+from .library import monomial_exponents, monomials, shift_matrix, velocity_names
 from .mechanics import Complexes, Round, on_circle, on_sphere
 from .model import PolynomialSystem, place, spoken, sum_text
 from .noise import CONSISTENT, GROSS, passing, residual_noise
-from .problem import COARSE, Problem
+from .problem import COARSE, FINAL_WEIGHT, Problem
 from .result import Path
 
 # --------------------------------------------------------------------------------------------------
@@ -77,7 +74,12 @@ def shapes(
     directions, flat = _across(x, noise)
     d, where = x.shape[1], _round(x, noise, flat)
     if where is not None:
-        yield _told(where)
+        round_one, _, _ = str(where).partition("\n")
+        free = "angle is" if where.shape == "circle" else "angles are"
+        yield (
+            f"the motion stays on a {round_one}: there its coordinates depend on each other and "
+            f"many laws fit alike; its {free} free (on_{where.shape} finds it), and order=2 a law"
+        )
     elif flat:
         shape = {1: "on a line", 2: "in a plane"}.get(d - flat, f"in {d - flat} of {d} dimensions")
         moving = [name for name, moves_too in zip(names, moves, strict=True) if moves_too]
@@ -165,23 +167,6 @@ def _round(x: Floats, noise: Floats, flat: int) -> Round | None:
     back = np.abs(np.diff(pieces)).sum() > 1.5 * length
     bound = back or (d > 2 and length > np.pi)
     return where if bound and _on(off, error, widths[-2], 10 * CLOSE if back else CLOSE) else None
-
-
-def _told(where: Round) -> str:
-    free = "angle is free: on_circle finds it"
-    if where.shape == "sphere":
-        free = "angles are free: on_sphere finds them"
-    # A number without the digits that its error, one of them excepted, leaves no meaning.
-    digits = 1 - np.floor(np.log10(np.maximum(where.centre_errors, LEAST))).astype(int)
-    centre = ", ".join(
-        f"{round(value, n) + 0.0:.4g} +- {error:.1g}"
-        for value, n, error in zip(where.centre, digits.tolist(), where.centre_errors, strict=True)
-    )
-    return (
-        f"the motion stays on a {where.shape} (centre {centre}; radius {where.radius:.5g} +- "
-        f"{where.radius_error:.1g}): there its coordinates depend on each other and many laws fit "
-        f"alike; its {free}, and order=2 a law"
-    )
 
 
 def _closed(t: Floats, x: Floats, noise: Floats, terms: Ints, most: int = 3000) -> Iterator[str]:
@@ -403,17 +388,16 @@ class Wider:
     Parameters
     ----------
     problem : Problem
-        With all of these as candidates; it has no penalties.
+        With all of these as candidates; its penalties are those of the library alone.
     fit : Fit
         With the old terms alone.
-    further : ndarray of int
-        Places in the coefficients, equation by equation, of the terms that the library has not, not
-        even as a function of another name.
+    old : int
+        How many terms the library has.
     """
 
     problem: Problem
     fit: Fit
-    further: Ints
+    old: int
 
     @cached_property
     def model(self) -> Linearisation:
@@ -421,10 +405,16 @@ class Wider:
         return self.problem.model(self.fit)
 
     @cached_property
+    def further(self) -> Ints:
+        """Places in the coefficients, equation by equation, of terms that the library has not."""
+        searched = self.problem.form.searched
+        return searched[searched % len(self.problem.exponents) >= self.old]
+
+    @cached_property
     def beyond(self) -> Beyond:
         """The score test of the terms that the law has not."""
-        own, searched = np.flatnonzero(self.fit.state.free()), self.problem.form.searched
-        others = np.append(self.further, np.setdiff1d(searched, np.append(own, self.further)))
+        own = np.flatnonzero(self.fit.state.free())
+        others = np.setdiff1d(self.problem.form.searched, own)
         model = self.model.of(np.append(own, others))
         estimate, variance = newcomers(model.information, model.gradient, len(own))
         single = estimate**2 / variance
@@ -442,44 +432,40 @@ class Wider:
 def widened(problem: Problem, fit: Fit, budget: float = 5e6) -> Wider:
     """The last fit among terms beyond its library; of a fraction, in its numerators.
 
-    The budget is of entries of the derivatives of the data, or the curve, in the further terms.
+    Further terms are such as no function of the library is. The budget is of entries of the
+    derivatives of the data, or the curve, in these.
     """
     form, state, (size, d) = problem.form, fit.state, problem.form.known.shape
-    equations, grid = np.flatnonzero(form.candidates.any(axis=0)), fit.collocation.grid
-    entries = max(grid.x.size, grid.r * d) * len(equations)
+    equations, along = np.flatnonzero(form.candidates.any(axis=0)), fit.collocation.grid
+    entries = max(along.x.size, along.r * d) * len(equations)
     exponents = _higher(problem.exponents, form.states, budget / entries)
-    l = len(exponents)
 
     def padded(array: NDArray[Any]) -> NDArray[Any]:
-        return np.pad(array, ((0, l - size), (0, 0)))
+        return np.pad(array, ((0, len(exponents) - size), (0, 0)))
 
-    places = np.arange(d * l).reshape(d, l)
-    further, shared = places[equations, size:].ravel(), places.copy()
+    candidates = padded(form.candidates)
+    candidates[size:, equations] = True
+    places = np.arange(candidates.size).reshape(d, -1)
+    shared = places.copy()
     shared[:, :size] = places[:, :size].ravel()[form.shared].reshape(d, size)
     state = replace(
         state, coefficients=padded(state.coefficients), active=padded(state.active),
         shared=shared.ravel(),
     )  # fmt: skip
-    # With a known part of its own shape: a collocation is made for its library.
     known = padded(fit.collocation.known)
-    fit = replace(
-        fit, state=state, collocation=replace(fit.collocation, exponents=exponents, known=known)
-    )
-
-    def among(further: Ints) -> Wider:
-        candidates = padded(form.candidates) | np.isin(places.T, further)
-        wide = replace(
-            form, exponents=exponents, candidates=candidates, known=padded(form.known),
-            shared=shared.ravel(),
-        )  # fmt: skip
-        return Wider(replace(problem, form=wide, penalties=np.full(l, np.nan)), fit, further)
-
-    wider = among(further)
-    if form.functions:  # a function may be a monomial, and then it is no further term
-        old = np.setdiff1d(wider.problem.form.searched, further)
-        model = wider.model.of(np.append(old, further))
+    whole = replace(fit.collocation, exponents=exponents, known=known)
+    fit = replace(fit, state=state, collocation=whole)
+    form = replace(
+        form, exponents=exponents, candidates=candidates, known=padded(form.known),
+        shared=shared.ravel(),
+    )  # fmt: skip
+    wider = Wider(replace(problem, form=form), fit, size)
+    if form.functions:
+        old = np.setdiff1d(form.searched, wider.further)
+        model = wider.model.of(np.append(old, wider.further))
         _, variance = newcomers(model.information, model.gradient, len(old))
-        wider = among(further[np.isfinite(variance)])
+        candidates.T.flat[wider.further[~np.isfinite(variance)]] = False
+        wider = Wider(wider.problem, fit, size)
     return wider
 
 
@@ -506,8 +492,6 @@ def _higher(exponents: Ints, d: int, most: float) -> Ints:
 # An axis whose origin is that of the data is a claim: of all places in the box of the data it
 # would be just there. It is believed if the data hold it to be so likelier than chance makes it.
 
-ELSEWHERE = "another origin"
-"""That of a law is said to be elsewhere than where it was found."""
 VANISHED = 1e-6
 """What is left of a term in another frame, over the parts that cancel in it, if it vanishes."""
 
@@ -515,35 +499,38 @@ Rival = tuple[str, str, float]
 """Which other origin, along which axis, and by how much the criterion rises there."""
 
 
-def elsewhere(
-    problem: Problem, state: State, whole: Linearisation, law: PolynomialSystem
-) -> Iterator[Rival]:
+def elsewhere(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[Rival]:
     """Other laws that fit almost as well, with one free axis less or one more.
 
     Parameters
     ----------
     problem : Problem
         Its penalties.
-    state : State
-        Of the last fit.
-    whole : Linearisation
-        Around it, of all candidates and moving axes.
+    fit : Fit
+        The last one.
     law : PolynomialSystem
         The law in the frame of the data.
     """
-    # The offset stays where it is: with it free, the same law in another frame would count.
-    model = whole.of(problem.form.searched)
-    own = problem.penalty(state)
-    for axis, there in _neighbours(problem, state):
-        for value, rival in _cheapest_two(problem, state, model, there):
-            cost = value + problem.axis_penalty * there.moving.sum() - own
+    state, given = fit.state, problem.origin
+    axes = np.eye(problem.d, dtype=bool)[state.moving]
+    fewer = [(np.where(axis, given, state.offset), state.moving & ~axis) for axis in axes]
+    whole = closed(problem, fit, FINAL_WEIGHT)
+    every = problem.form.candidates | whole.state.active
+    whole = replace(whole, state=replace(whole.state, active=every))
+    own = problem.criterion(fit.collocation, state)
+    origins = [*fewer, *free_offsets(problem, state, problem.form.movable)]
+    found = laws_at(problem, whole, origins, free=True)
+    for (_, moving), laws in zip(origins, found, strict=True):
+        for one in laws:
+            cost, rival = one.criterion - own, one.state.coefficients
             if not cost < 4.0:  # a likelihood ratio of 7 tells two laws apart
                 break  # the next costs more
-            matrix = shift_matrix(problem.exponents, rival.offset - problem.origin)
-            parts = np.abs(matrix) @ np.abs(rival.coefficients)
-            terms = (np.abs(matrix @ rival.coefficients) > VANISHED * parts) | (problem.known != 0)
+            matrix = shift_matrix(problem.exponents, one.state.offset - given)
+            parts = np.abs(matrix) @ np.abs(rival)
+            terms = (np.abs(matrix @ rival) > VANISHED * parts) | (problem.known != 0)
             if (terms != law.support).any():
-                where = ELSEWHERE if there.moving[axis] else "the origin of the data"
+                axis = int(np.argmax(moving != state.moving))
+                where = "another origin" if moving[axis] else "the origin of the data"
                 yield where, problem.form.names[axis], cost
                 break
 
@@ -571,7 +558,7 @@ def pinned(
         new = (np.abs(moved) > VANISHED * np.abs(moved).max(initial=0.0)) & ~law.support
         # Odds of 20 to 1: strong evidence by Kass and Raftery 1995.
         if state.moving.any() and new.any() and room - gain < 6.0:
-            yield ELSEWHERE, problem.form.names[axis], room - gain
+            yield "another origin", problem.form.names[axis], room - gain
 
 
 def untold_origins(found: Sequence[Rival], remedy: str) -> Iterator[str]:
@@ -590,44 +577,6 @@ def untold_origins(found: Sequence[Rival], remedy: str) -> Iterator[str]:
             f"the data hardly tell where the law's origin is in {' and in '.join(axes)}: other "
             f"terms around {where} fit almost as well (criterion {least:+.1f}); use {remedy}"
         )
-
-
-def _neighbours(problem: Problem, state: State) -> Iterator[tuple[int, State]]:
-    """The same law with a free axis where the data have it, or one free that is not, and which."""
-    axes = np.eye(problem.d, dtype=bool)[state.moving]
-    fewer = [(np.where(axis, problem.origin, state.offset), state.moving & ~axis) for axis in axes]
-    for origin, moving in [*fewer, *free_offsets(problem, state, problem.form.movable)]:
-        moved = shift_matrix(problem.exponents, state.offset - origin) @ state.coefficients
-        axis = int(np.argmax(moving != state.moving))
-        yield axis, replace(state, coefficients=moved, offset=origin, moving=moving)
-
-
-def _cheapest_two(
-    problem: Problem, state: State, model: Linearisation, there: State
-) -> Iterator[tuple[float, State]]:
-    """The cheapest law around a state in another frame and its closest rival, with their costs."""
-    # The quadratic model around the law knows them: what a move does to polynomials is exact.
-    columns, size = problem.columns(there), state.coefficients.size
-    back = shift_matrix(problem.exponents, there.offset - state.offset)
-    axes = np.flatnonzero(there.moving)
-    rates = -shift_generators(problem.exponents)[axes] @ there.coefficients
-    changes = np.vstack([np.eye(size), rates.transpose(0, 2, 1).reshape(-1, size)])
-    changes = changes[np.append(problem.form.searched, np.arange(size, len(changes)))]
-    changes = (changes @ np.kron(np.eye(problem.d), back.T))[:, model.columns]
-    step = (back @ there.coefficients - state.coefficients).T.ravel()[model.columns]
-    pull, present = model.gradient - model.information @ step, there.flat()[columns]
-    quadratic = changes @ model.information @ changes.T, changes @ pull, present
-    risen = float(-step @ (model.gradient + pull))
-    penalties = np.append(problem.entry_penalties, np.full(problem.d, -np.inf))[columns]
-    start = (present != 0) | (columns >= size)
-    support, solution, value = subset_search(*quadratic, penalties, start)
-    flat = there.flat()
-    flat[columns] = solution
-    yield risen + value, there.moved(there.control_points, flat)
-    cost, dropped, added = closest_rival(*quadratic, penalties, support)
-    support[dropped], support[added] = False, True
-    flat[columns] = minimiser(*quadratic, support)
-    yield risen + value + cost, there.moved(there.control_points, flat)
 
 
 # --------------------------------------------------------------------------------------------------
@@ -670,7 +619,7 @@ def diagnose(
         *_misfit(problem, fit, wider),
         *_unmet(problem, fit, law, remedy),
         *_contested(problem, fit.state, path, remedy),
-        *_rivals(problem, fit.state, model, wider, path, law, remedy, clean),
+        *_rivals(problem, fit, model, wider, path, law, remedy, clean),
         *_sampling(problem, law, remedy),
     )
 
@@ -689,7 +638,7 @@ def _met(problem: Problem, fit: Fit) -> list[Bools]:
 
 
 def outliers(
-    trajectories: Sequence[Trajectory], met: Sequence[Bools] | None = None, limit: float = 30.0
+    trajectories: Sequence[Trajectory], met: Sequence[Bools], limit: float = 30.0
 ) -> list[str]:
     """Samples so far from those around them that they must be errors.
 
@@ -697,7 +646,7 @@ def outliers(
     ----------
     trajectories : sequence of Trajectory
         The data in the user's units.
-    met : sequence of ndarray of bool, shape (n,), optional
+    met : sequence of ndarray of bool, shape (n,)
         Which samples of each a law passes through: what it explains is no error.
     limit : float
         Distance of a sample from those around it, over how far nine samples in ten are from the
@@ -705,24 +654,24 @@ def outliers(
         50 % makes 6.
     """
     found = []
-    met = [np.zeros(len(t), dtype=bool) for t, _ in trajectories] if met is None else met
     for (t, x), explained in zip(trajectories, met, strict=True):
-        far: set[int] = set()
+        far = np.zeros(len(t), dtype=bool)
         for column in x.T[np.isfinite(x).any(axis=0)]:
             seen = np.flatnonzero(np.isfinite(column))
             values = column[seen]
             distance = np.abs(values - np.median(values))
             spread = np.quantile(distance, 0.9)
-            for row in np.flatnonzero((distance > limit * spread) & (spread > 0)).tolist():
-                # Far from those around it, too, it is no part of a motion far away. These are from
-                # 3 to 8 before and after it: so three errors in a row are compared with none.
-                beside = np.append(values[max(row - 8, 0) : max(row - 2, 0)], values[row + 3 :][:6])
-                middle = np.median(beside)
-                if abs(values[row] - middle) > limit * np.median(np.abs(beside - middle)):
-                    far.add(int(seen[row]))
-        far -= set(np.flatnonzero(explained).tolist())
+            rows = np.flatnonzero((distance > limit * spread) & (spread > 0))
+            # Far from those around it, too, it is no part of a motion far away. These are from 3 to
+            # 8 before and after it: so three errors in a row are compared with none.
+            around = np.append(np.arange(6), np.arange(11, 17)) + rows[:, None]
+            beside = np.pad(values, 8, constant_values=np.nan)[around]
+            apart = np.abs(values[rows] - np.nanmedian(beside, axis=1))
+            own = np.abs(beside - np.nanmedian(beside, axis=1, keepdims=True))
+            far[seen[rows[apart > limit * np.nanmedian(own, axis=1)]]] = True
         found += [
-            f"t = {t[row]:g}, x = ({', '.join(f'{v:g}' for v in x[row])})" for row in sorted(far)
+            f"t = {t[row]:g}, x = ({', '.join(f'{v:g}' for v in x[row])})"
+            for row in np.flatnonzero(far & ~explained).tolist()
         ]
     if not found:
         return []
@@ -844,13 +793,13 @@ def _range(low: float, high: float) -> str:
 
 
 def _rivals(
-    problem: Problem, state: State, model: Linearisation, wider: Wider, path: Path,
+    problem: Problem, fit: Fit, model: Linearisation, wider: Wider, path: Path,
     law: PolynomialSystem, remedy: str, clean: bool,
 ) -> Iterator[str]:  # fmt: skip
     """Do other terms or another origin explain the data as well?"""
     if clean and not problem.has_process_noise:
         return  # what is left is the error of the splines, not noise: it settles nothing
-    tolerant = clean or max(plateau.low for plateau in path.of(state.active)) > path.lowest
+    tolerant = clean or max(p.low for p in path.of(fit.state.active)) > path.lowest
     found = wider.beyond
     # Errors that last may follow the state, too; they are no reason to doubt, unless a single term,
     # or the few that a single coordinate has, explain nearly all of them.
@@ -861,10 +810,10 @@ def _rivals(
             "may be an approximation along these data, as of a sine or a drag; raise the degree, "
             "or name its terms with library="
         )
-    origins = list(pinned(problem, state, model, law, path.tolerated))
+    origins = list(pinned(problem, fit.state, model, law, path.tolerated))
     if not tolerant:  # weaker errors than those tolerated say nothing about the law
         yield from _far_neighbours(wider, remedy)
-        origins += elsewhere(problem.cautious, state, model, law)
+        origins += elsewhere(problem.cautious, fit, law)
     yield from untold_origins(origins, remedy)
 
 
@@ -883,7 +832,7 @@ def _far_neighbours(wider: Wider, remedy: str, odds_allowed: float = 0.02) -> It
         model.information, model.gradient, present, penalties, support
     )
     if odds > odds_allowed:
-        out, into = (" and ".join(place(law, columns[k]) for k in at) for at in (dropped, added))
+        out, into = (place(law, columns[k]) if k >= 0 else "" for k in (dropped, added))
         change = f"{into} instead of {out}" if out and into else f"with {into}" if into else ""
         change = change or f"without {out}"
         yield (
@@ -913,7 +862,7 @@ def _sampling(problem: Problem, law: PolynomialSystem, remedy: str) -> Iterator[
     if problem.has_process_noise and (coarse or turns < 10):
         few = f"{turns:.1f} turns of {problem.samples_a_turn:.0f} samples each"
         yield (
-            f"the motion is taken for kicked at random, which {few} cannot tell from a drive or a "
+            f"the motion is taken to have process noise, which {few} cannot tell from a drive or a "
             f"force that nobody named: {'sample faster' if coarse else 'record longer'}, or name it"
         )
     # A body without a force moves evenly.

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from .collocation import Fit, Linearisation, State
-from .l0 import newcomers, subset_search
+from .l0 import closest_rival, minimiser, newcomers, subset_search
 from .library import divides, shift_generators, shift_matrix
 from .problem import Problem
 
@@ -60,13 +60,14 @@ class ShiftedLaw:
         return np.arange(self.d) if self.movable is None else np.flatnonzero(self.movable)
 
     @cached_property
-    def _generators(self) -> Floats:
+    def generators(self) -> Floats:
+        """What a move along each axis does to the law; see `shift_generators`."""
         return shift_generators(self.exponents)
 
     @cached_property
     def _with_rates(self) -> Floats:
         """The coefficients and their rates along the movable axes, which shifts carry alike."""
-        return np.stack([self.coefficients, *(self._generators[self.axes] @ self.coefficients)])
+        return np.stack([self.coefficients, *(self.generators[self.axes] @ self.coefficients)])
 
     def at(self, origin: Floats) -> tuple[Floats, Floats, Floats]:
         """Coefficients (l, d), information and gradient in monomials of ``x - origin``."""
@@ -146,31 +147,54 @@ def closed(problem: Problem, fit: Fit, weight: float) -> Fit:
 
 
 def cheapest(problem: Problem, whole: Fit, origins: Sequence[Origin]) -> Fit:
-    """The cheapest support at one of some origins, by the quadratic model around a law.
+    """The cheapest support at one of some origins, by the quadratic model around a law."""
+    found = map(next, laws_at(problem, whole, origins))
+    return min(found, key=lambda fit: fit.criterion)
 
-    That has all terms of the library, or of a shift closure; what it lacks stays zero.
+
+def laws_at(
+    problem: Problem, whole: Fit, origins: Sequence[Origin], free: bool = False
+) -> Iterator[Iterator[Fit]]:
+    """The cheapest law at each of some origins, and its closest rival there.
+
+    By the quadratic model around a law in the centred frame, with all terms of the library, or of a
+    shift closure; what it lacks stays zero. Axes that are off may be left ``free`` to move on.
     """
     state, columns = whole.state, np.flatnonzero(whole.state.free())
     information = np.diag(np.where(state.free()[: -problem.d], 0.0, 1e30))
     model, gradient = whole.collocation.linearise(state, columns), np.zeros(len(information))
     information[np.ix_(columns, columns)], gradient[columns] = model.information, model.gradient
     law = ShiftedLaw(problem.exponents, state.coefficients, information, gradient=gradient)
-    objective, every = whole.collocation.objective(state), np.ones(len(columns), dtype=bool)
+    objective, size = whole.collocation.objective(state), len(columns)
 
-    def at(origin: Floats, moving: Bools) -> Fit:
+    def at(origin: Floats, moving: Bools) -> Iterator[Fit]:
         coefficients, information, gradient = law.at(origin)
-        _, solution, value = subset_search(
-            information[np.ix_(columns, columns)], gradient[columns],
-            coefficients.T.ravel()[columns], problem.entry_penalties[columns], every,
-        )  # fmt: skip
-        flat = np.append(np.zeros(state.coefficients.size), origin)
-        flat[columns] = solution
-        there = state.moved(state.control_points, flat)
-        there = replace(there, active=there.coefficients != 0, moving=moving)
-        cost = objective + value + problem.axis_penalty * moving.sum()
-        return replace(whole, state=there, criterion=cost)
+        axes = np.flatnonzero(moving & free)
+        rates = -law.generators[axes] @ coefficients
+        flat_rates = rates.swapaxes(1, 2).reshape(-1, coefficients.size)
+        ways = np.vstack([np.eye(size), flat_rates[:, columns]])
+        present = np.append(coefficients.T.ravel()[columns], np.zeros(len(axes)))
+        information = ways @ information[np.ix_(columns, columns)] @ ways.T
+        quadratic = information, ways @ gradient[columns], present
+        penalties = np.append(problem.entry_penalties[columns], np.full(len(axes), -np.inf))
 
-    return min((at(*origin) for origin in origins), key=lambda fit: fit.criterion)
+        def told(solution: Floats, value: float) -> Fit:
+            flat = np.append(np.zeros(state.coefficients.size), origin)
+            flat[columns] = solution[:size]
+            flat[state.coefficients.size + axes] += solution[size:]
+            there = state.moved(state.control_points, flat)
+            there = replace(there, active=there.coefficients != 0, moving=moving)
+            cost = objective + value + problem.axis_penalty * moving.sum()
+            return replace(whole, state=there, criterion=cost)
+
+        every = np.ones(len(present), dtype=bool)
+        support, solution, value = subset_search(*quadratic, penalties, every)
+        yield told(solution, value)
+        cost, dropped, added = closest_rival(*quadratic, penalties, support)
+        support[dropped], support[added] = False, True
+        yield told(minimiser(*quadratic, support), value + cost)
+
+    return (at(*origin) for origin in origins)
 
 
 def with_free_axis(

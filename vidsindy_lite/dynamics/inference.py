@@ -97,7 +97,7 @@ def infer(
     # What the frame of the data needs is decided at the errors at which the terms were chosen.
     tolerated = np.maximum([plateau.low / path.own for plateau in path.of(state.active)], 1.0)
     # To what the shift adds nothing, that the fit has weighed.
-    weighed = _shifted(exponents, coefficients, offset) == coefficients.T.ravel()
+    weighed = _shifted(exponents, coefficients, offset)[0] == coefficients.T.ravel()
     penalties = np.where(weighed, KEPT, problem.entry_penalties * np.repeat(tolerated, l) ** 2)
     native = exponents, coefficients, offset, covariance
     moved, moved_covariance = _pruned(*native, penalties)
@@ -160,40 +160,19 @@ def _covariance(units: Units, fit: Fit, model: Linearisation) -> Floats:
     covariance[np.ix_(columns, columns)] = inverse(model.of(columns).information)
     factors = units.factors(fit.collocation.exponents)
     unit = np.concatenate([factors.T.ravel(), units.scale])
-    for entry, first in fit.state.followers():
-        covariance[entry] = covariance[first]
-    for entry, first in fit.state.followers():
-        covariance[:, entry] = covariance[:, first]
-    return covariance * (unit[:, None] * unit)
+    sources = fit.state.sources
+    return covariance[np.ix_(sources, sources)] * (unit[:, None] * unit)
 
 
-def _shifted(exponents: Ints, coefficients: Floats, offset: Floats) -> Floats:
-    """The coefficients of a law in the data's frame, equation by equation, (l d,)."""
-    return (shift_matrix(exponents, offset) @ coefficients).T.ravel()
+def _shifted(exponents: Ints, coefficients: Floats, offset: Floats) -> tuple[Floats, Floats]:
+    """The coefficients of a law in the data's frame, equation by equation, (l d,).
 
-
-def _entry(exponents: Ints, coefficients: Floats, offset: Floats, k: int) -> tuple[float, Floats]:
-    """One of them, and its derivatives in coefficients and offset, (l d + d,)."""
-    (l, d), (j, row) = coefficients.shape, divmod(k, len(exponents))
-    matrix = shift_matrix(exponents, offset)
-    slope, moved = np.zeros(l * d + d), matrix @ coefficients[:, j]
-    slope[j * l : (j + 1) * l] = matrix[row]
-    slope[l * d :] = -shift_generators(exponents)[:d, row] @ moved
-    return float(moved[row]), slope
-
-
-def _carried(exponents: Ints, coefficients: Floats, offset: Floats, covariance: Floats) -> Floats:
-    """Their covariance, (l d, l d), from that of coefficients and offset."""
-    (l, d), size = coefficients.shape, coefficients.size
-    matrix = shift_matrix(exponents, offset)
-    along = -shift_generators(exponents)[:d] @ (matrix @ coefficients)
-    rates = along.swapaxes(1, 2).reshape(d, size).T
-
-    def moved(rows: Floats) -> Floats:
-        own = matrix @ rows[:size].reshape(d, l, -1)
-        return np.asarray(own.reshape(size, -1) + rates @ rows[size:])
-
-    return moved(moved(covariance).T)
+    And their derivatives in coefficients and offset, (l d, l d + d).
+    """
+    d, matrix = len(offset), shift_matrix(exponents, offset)
+    moved = matrix @ coefficients
+    rates = (-shift_generators(exponents)[:d] @ moved).transpose(2, 1, 0).reshape(-1, d)
+    return moved.T.ravel(), np.hstack([np.kron(np.eye(d), matrix), rates])
 
 
 def _powers(exponents: Ints, coefficients: Floats, offset: Floats) -> Ints:
@@ -219,12 +198,17 @@ def _pruned(
     """
     shape, size = coefficients.shape[::-1], coefficients.size
     native = np.concatenate([coefficients.T.ravel(), offset])
-    flat = _shifted(exponents, coefficients, offset)
-    powers = _powers(exponents, coefficients, offset)
-    moved = _carried(exponents, coefficients, offset, covariance)
-    original, dead = np.diag(moved).copy(), flat == 0
+    free, powers = np.flatnonzero(np.diag(covariance)), _powers(exponents, coefficients, offset)
+
+    def moved(point: Floats) -> tuple[Floats, Floats]:
+        return _shifted(exponents, point[:size].reshape(shape).T, point[size:])
+
+    (flat, slopes), original = moved(native), None
+    dead = flat == 0
     for _ in range(size + 1):
-        variance = np.diag(moved)
+        left = slopes[:, free] @ covariance[np.ix_(free, free)] @ slopes[:, free].T
+        variance = np.diag(left)
+        original = variance if original is None else original
         # After conditioning, a dependent entry has neither value nor variance left.
         known = variance <= 1e-12 * original
         dead |= known & (flat**2 < 1e-6 * original)
@@ -235,18 +219,17 @@ def _pruned(
         if not len(live) or weakness.min() >= 1:
             break
         # Of the powers of one offset the lowest: the others vanish with it.
-        weakest = np.lexsort([weakness, np.where(weakness < 1, powers[live], size)])[0]
-        k = live[weakest]
+        k = live[np.lexsort([weakness, np.where(weakness < 1, powers[live], size)])[0]]
         dead[k] = True
         point = native
         for _ in range(3):  # the shift is linear around where it is held alone
-            value, slope = _entry(exponents, point[:size].reshape(shape).T, point[size:], int(k))
-            pull = covariance @ slope
-            point = native - pull * ((value + slope @ (native - point)) / (slope @ pull))
-        covariance = covariance - np.outer(pull, pull / (slope @ pull))
-        native, law = point, (point[:size].reshape(shape).T, point[size:])
-        flat = _shifted(exponents, *law)
-        moved = _carried(exponents, *law, covariance)
+            flat, slopes = moved(point)
+            pull = covariance @ slopes[k]
+            room = slopes[k] @ pull
+            point = native - pull * ((flat[k] + slopes[k] @ (native - point)) / room)
+        covariance = covariance - np.outer(pull, pull / room)
+        native = point
+        flat, slopes = moved(native)
     flat = np.where(dead, 0.0, flat)
-    moved[dead] = moved[:, dead] = 0.0
-    return flat.reshape(shape).T, moved
+    left[dead] = left[:, dead] = 0.0
+    return flat.reshape(shape).T, left

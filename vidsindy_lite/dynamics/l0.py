@@ -399,7 +399,7 @@ def prior_penalties(exponents: Ints) -> Floats:
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of columns that are combinations
 def far_neighbours(
     information: Floats, gradient: Floats, present: Floats, penalty: Floats, support: Bools
-) -> tuple[float, Ints, Ints, int, float]:
+) -> tuple[float, int, int, int, float]:
     """The odds of the neighbours of a support that have other entries, and the likeliest of them.
 
     Parameters
@@ -416,39 +416,33 @@ def far_neighbours(
     odds : float
         Probability of all that have an entry more than `FAR` errors away, if the law is the support
         or one of its neighbours.
-    dropped, added : ndarray of int
-        The entries that the likeliest of them drops and adds.
+    dropped, added : int
+        The entries that the likeliest of them drops and adds; -1 if it drops or adds none.
     entry : int
         Which of the support it has farthest away, ...
     value : float
         ... and what that is there.
     """
-    matrix, scale = equilibrated(information)
-    own, others = np.flatnonzero(support), np.flatnonzero(~support)
-    shared = matrix[np.ix_(others, own)]
-    inverse = np.linalg.inv(matrix[np.ix_(own, own)])
-    pull, spread = matrix @ (present / scale) + gradient * scale, np.diag(inverse)
-    fitted, response = inverse @ pull[own], shared @ inverse
-    # First axis: the entry that leaves, last of all none; second: the one that joins, likewise.
-    leaves, none = np.eye(len(own) + 1, len(own), dtype=bool)[:, None], np.zeros((1, len(own)))
-    out, gone = np.vstack([inverse / spread[:, None], none]), np.append(fitted, 0.0)[:, None]
-    lost = fitted**2 / spread + np.log(spread * scale[own] ** 2) - penalty[own]
-    along = np.vstack([(response / spread).T, np.zeros((1, len(others)))])
-    freed = along * np.append(spread, 0.0)[:, None]
-    left = pull[others] - response @ pull[own] + along * gone
-    room = 1 - (response * shared).sum(axis=1) + along * freed
-    new = room > COLLINEAR
-    step = np.where(new, left / room, 0.0)
-    entered = np.log(room / scale[others] ** 2) + penalty[others] - left * step
-    joined = np.where(new, entered, np.inf)
-    cost = np.append(lost, 0.0)[:, None] + np.hstack([joined, np.zeros((len(own) + 1, 1))])
-    gives = np.concatenate([response - freed[:, :, None] * out[:, None], 0.0 * leaves], axis=1)
-    values = (fitted - out * gone)[:, None] - gives * np.hstack([step, 0.0 * gone])[:, :, None]
-    values = np.where(leaves, 0.0, values)
-    apart = np.abs(values - fitted) / np.sqrt(spread)
+    model = _Quadratic.of(information, gradient, present, penalty)
+    law, found, price = model.fit(support), [], penalty - 2 * np.log(model.scale)
+    for dropped in (-1, *law.inside.tolist()):
+        fit = model.fit(support & (np.arange(len(support)) != dropped))
+        outside, room = fit.outside, fit.room
+        new = (room > COLLINEAR) & (outside != dropped)  # to add what was dropped is the law itself
+        own = fit.fall - np.linalg.slogdet(fit.inverse)[1] + price[fit.inside].sum()
+        joined = np.where(new, own + np.log(room) - fit.gained + price[outside], np.inf)
+        step = np.where(new, fit.left[outside] / room, 0.0)
+        values = np.zeros((1 + len(outside), len(law.inside)))
+        values[:, law.inside != dropped] = fit.fitted
+        values[1:, law.inside != dropped] -= step[:, None] * fit.response
+        out = np.full(len(values), dropped)
+        found.append((np.append(own, joined), values, out, np.append(-1, outside)))
+    cost, values, out, into = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    apart = np.abs(values - law.fitted) / np.sqrt(law.spread)
     weight = np.exp((cost.min() - cost) / 2)
-    weight = np.where((apart > FAR).any(axis=2), weight / weight.sum(), 0.0)
-    drop, add = np.unravel_index(weight.argmax(), weight.shape)
-    entry = int(apart[drop, add].argmax())
-    value = float(values[drop, add, entry] * scale[own[entry]])
-    return float(weight.sum()), own[drop : drop + 1], others[add : add + 1], int(own[entry]), value
+    weight = np.where((apart > FAR).any(axis=1), weight / weight.sum(), 0.0)
+    best = int(weight.argmax())
+    farthest = int(apart[best].argmax())
+    entry = int(law.inside[farthest])
+    value = float(values[best, farthest] * model.scale[entry])
+    return float(weight.sum()), int(out[best]), int(into[best]), entry, value

@@ -62,34 +62,39 @@ class Function:
         How it is printed.
     value : callable
         From points (n, d) to values (n,).
-    gradient : callable
-        From points (n, d) to derivatives (n, d).
+    axes : sequence of int
+        On which coordinates it depends; on none, if it is a function of the time alone.
     direction : int, optional
         Of a component of a vector, which one it is: the first has the others after it, each stands
         in the equation of its direction alone, and all have one coefficient.
-    of_time : bool
-        Whether it depends on the time alone.
     """
 
     name: str
     latex: str
     value: Callable[[Floats], Floats]
-    gradient: Callable[[Floats], Floats]
+    axes: Sequence[int]
     direction: int | None = None
-    of_time: bool = False
 
     @classmethod
     def unknown(cls, name: str) -> Function:
         """A function of which nothing but the name is known: NaN everywhere."""
-        return cls(name, name, lambda x: np.full(len(x), np.nan), np.zeros_like)
+        return cls(name, name, lambda x: np.full(len(x), np.nan), (0,))
 
-    def standardised(self, centre: Floats, scale: Floats, size: float) -> Function:
-        """The same function over ``size``, of points less ``centre``, over ``scale``."""
-        return replace(
-            self,
-            value=lambda x: self.value(centre + scale * x) / size,
-            gradient=lambda x: self.gradient(centre + scale * x) * scale / size,
-        )
+    @property
+    def of_time(self) -> bool:
+        """Whether it depends on the time alone."""
+        return not self.axes
+
+    def gradient(self, x: Floats) -> Floats:
+        """Derivatives at points (n, d), by differences of fourth order, (n, d)."""
+        result = np.zeros_like(x)
+        for axis in self.axes:
+            step = np.zeros(x.shape[1])
+            step[axis] = 1e-4 * (np.abs(x[:, axis]).mean() or 1.0)
+            near = self.value(x + step) - self.value(x - step)
+            far = self.value(x + 2 * step) - self.value(x - 2 * step)
+            result[:, axis] = (8 * near - far) / (12 * step[axis])
+        return result
 
 
 def extended(x: Floats, functions: Sequence[Function]) -> Floats:
@@ -683,20 +688,10 @@ def check_library(degree: int | None, library: Library | None) -> Library:
 
 def harmonic(names: tuple[str, ...], axis: int, multiple: int, kind: str) -> Function:
     """Sine or cosine of a multiple of a coordinate."""
-    of, slope, sign = (np.sin, np.cos, 1) if kind == "sin" else (np.cos, np.sin, -1)
-
-    def gradient(x: Floats) -> Floats:
-        result = np.zeros_like(x)
-        result[:, axis] = sign * multiple * slope(multiple * x[:, axis])
-        return result
-
-    times = "" if multiple == 1 else f"{multiple} "
-    return Function(
-        name=f"{kind}({times}{names[axis]})",
-        latex=rf"\{kind}({times}{name_latex(names[axis])})",
-        value=lambda x: of(multiple * x[:, axis]),
-        gradient=gradient,
-    )
+    times, of = "" if multiple == 1 else f"{multiple} ", {"sin": np.sin, "cos": np.cos}[kind]
+    latex = rf"\{kind}({times}{name_latex(names[axis])})"
+    value = lambda x: of(multiple * x[:, axis])  # noqa: E731
+    return Function(f"{kind}({times}{names[axis]})", latex, value, (axis,))
 
 
 def own(
@@ -707,9 +702,18 @@ def own(
     inputs: Mapping[str, Input],
 ) -> list[Function]:
     """A function of one's own, of variables and inputs by their names; or its components."""
-    arguments = _checked_arguments((*names, *inputs), name, rule)
+    arguments = _arguments(rule)
+    unknown = [argument for argument in arguments if argument not in (*names, *inputs)]
+    if not arguments or unknown:
+        moving = not set(velocity_names((*names, *inputs))).isdisjoint(unknown)
+        raise ValueError(
+            f"library: the arguments of {name!r} must be named like variables "
+            f"({', '.join((*names, *inputs))}), as in lambda x: np.sin(x), got "
+            + (", ".join(unknown) or "none")
+            + ": velocities are variables of a law of order=2" * moving
+        )
     axes = [names.index(argument) for argument in arguments if argument in names]
-    moving = [axis for axis in axes if names[axis] != CLOCK or axis < measured]
+    axes = [axis for axis in axes if names[axis] != CLOCK or axis < measured]
 
     def evaluate(x: Floats) -> Floats:
         values = dict(zip(names, x.T, strict=True))
@@ -729,40 +733,15 @@ def own(
             f"library: {name!r} must return an array of the shape of its arguments, (n,), or "
             f"{measured} of these, got shape {shape} for n = 2 and {longer} for n = 3"
         )
+    latex = rf"\mathrm{{{name}}}"
 
-    def component(direction: int | None) -> Function:
-        def value(x: Floats) -> Floats:
-            values = evaluate(x)
-            return values if direction is None else values[direction]
+    def component(j: int) -> Function:
+        of = names[j]
+        return Function(f"{name}_{of}", f"{latex}_{{{of}}}", lambda x: evaluate(x)[j], axes, j)
 
-        of = "" if direction is None else names[direction]
-        return Function(
-            name=f"{name}_{of}" if of else name,
-            latex=rf"\mathrm{{{name}}}" + (f"_{{{of}}}" if of else ""),
-            value=value,
-            gradient=lambda x: _differences(value, x, moving),
-            direction=direction,
-            of_time=not moving,
-        )
-
-    return [component(j) for j in (range(measured) if len(shape) == 2 else [None])]
-
-
-def _checked_arguments(
-    names: tuple[str, ...], name: str, rule: Callable[..., ArrayLike]
-) -> list[str]:
-    """The arguments of a function, which must be among some names."""
-    arguments = _arguments(rule)
-    unknown = [argument for argument in arguments if argument not in names]
-    if not arguments or unknown:
-        moving = not set(velocity_names(names)).isdisjoint(unknown)
-        raise ValueError(
-            f"library: the arguments of {name!r} must be named like variables "
-            f"({', '.join(names)}), as in lambda x: np.sin(x), got {', '.join(unknown) or 'none'}"
-            + ": velocities are variables of a law of order=2"
-            * moving
-        )
-    return arguments
+    if len(shape) == 1:
+        return [Function(name, latex, evaluate, axes)]
+    return [component(j) for j in range(measured)]
 
 
 def _arguments(rule: Callable[..., ArrayLike]) -> list[str]:
@@ -772,15 +751,3 @@ def _arguments(rule: Callable[..., ArrayLike]) -> list[str]:
     except (TypeError, ValueError):
         return []
     return [name for name, known in parameters.items() if known.default is known.empty]
-
-
-def _differences(value: Callable[[Floats], Floats], x: Floats, axes: Sequence[int]) -> Floats:
-    """Derivatives of a function along axes by differences of fourth order, (n, d)."""
-    result = np.zeros_like(x)
-    for axis in axes:
-        step = np.zeros(x.shape[1])
-        step[axis] = 1e-3 * (np.abs(x[:, axis]).mean() or 1.0)
-        near = value(x + step) - value(x - step)
-        far = value(x + 2 * step) - value(x - 2 * step)
-        result[:, axis] = (8 * near - far) / (12 * step[axis])
-    return result

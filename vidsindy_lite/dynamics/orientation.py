@@ -8,7 +8,7 @@ does for shifts.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 from math import comb
@@ -26,7 +26,7 @@ from ..checks import check_choice
 from .collocation import Fit, Linearisation, State
 from .data import Trajectory, variable_names
 from .l0 import inverse
-from .library import Library, monomial_gradients, monomials
+from .library import Library, monomials
 from .model import Form
 from .problem import Problem, leaves_something_over, tightened, unpruned
 from .result import Discovery
@@ -69,15 +69,6 @@ class TurnedLaw:
         stacked = np.vstack([flat, directions]).reshape(-1, m, rows.sum())
         return cls(problem.exponents[rows], np.moveaxis(stacked, 1, 2))
 
-    def _mapped(self, inward: Floats, origin: Floats, outward: Floats) -> TurnedLaw:
-        """The law of ``outward f(inward y + origin)``, compared at points enough."""
-        count, d = self.exponents.shape
-        origin = np.append(origin, np.zeros(d - len(origin)))  # velocities have none
-        y = np.random.default_rng(0).uniform(-1, 1, (POINTS * count, d))
-        values = monomials(y @ inward.T + origin, self.exponents) @ self.estimates @ outward.T
-        fitted = np.linalg.pinv(monomials(y, self.exponents)) @ values
-        return replace(self, estimates=fitted)
-
     def seen(self, turn: Floats, origin: Floats) -> tuple[Floats, Floats]:
         """Coefficients and their variances, (l, m), in axes that are the rows of ``turn``, (m, m).
 
@@ -85,8 +76,10 @@ class TurnedLaw:
         """
         m = len(turn)
         copies = self.exponents.shape[1] // m
-        law = self._mapped(block_diag(*[turn.T] * copies), origin, turn)
-        return law.estimates[0], (law.estimates[1:] ** 2).sum(axis=0)
+        whole = np.append(origin, np.zeros(self.exponents.shape[1] - m))  # velocities have none
+        inward = block_diag(*[turn.T] * copies)
+        law, *spread = _mapped(self.exponents, self.estimates, inward, whole, turn)
+        return law, (np.array(spread) ** 2).sum(axis=0)
 
     def descended(self, turn: Floats, origin: Floats, size: float) -> tuple[float, Floats, Floats]:
         """The nearest orientation and origin with fewest terms, and their smoothed number.
@@ -107,17 +100,30 @@ class TurnedLaw:
         return float(best.cost), *moved(best.x)
 
 
-def rough_orientations(problem: Problem, rng: np.random.Generator) -> list[Floats]:
-    """Orientations in which fits of all terms up to a degree look sparse, for degrees as needed."""
-    degrees = problem.exponents.sum(axis=1)
+def rough_orientations(problem: Problem, rng: np.random.Generator, most: int = 3) -> list[Floats]:
+    """Orientations in which fits of all terms up to a degree look sparse, for degrees as needed.
+
+    Of each degree at most so many, sought from those of lower degrees, from the data's own, and
+    from 20 random ones; by the 40 largest directions of uncertainty.
+    """
+    degrees, m = problem.exponents.sum(axis=1), _places(problem)
     found: list[Floats] = []
     for degree in range(1, problem.form.degree + 1):
         fit, converged = unpruned(problem, degrees <= degree)
         if not converged:  # too many terms for these data
             continue
-        for turn in sparse_orientations(TurnedLaw.of(problem, fit), found, rng):
-            if all(apart(turn, other) > ALIKE for other in found):
-                found.append(turn)
+        law = TurnedLaw.of(problem, fit)
+        law = replace(law, estimates=law.estimates[:41])
+        starts = [*found, np.eye(m), *special_ortho_group.rvs(m, 20, rng)]
+        # A coefficient counts from a tenth of its standard size on, at the end from a hundredth.
+        coarse = [law.descended(turn, np.zeros(m), 0.1) for turn in starts]
+        coarse.sort(key=itemgetter(0))
+        fine = [law.descended(turn, origin, 0.01) for _, turn, origin in coarse[: 2 * most]]
+        limit = len(found) + most
+        for _, turn, _ in sorted(fine, key=itemgetter(0)):
+            near = nearest(turn)
+            if len(found) < limit and all(apart(near, other) > ALIKE for other in found):
+                found.append(near)
         if not leaves_something_over(problem, fit):
             break
     return found
@@ -166,23 +172,31 @@ def with_turns(problem: Problem, fit: Fit, chosen: float = 1e-8) -> Linearisatio
     )
 
 
-def _turns(problem: Problem, state: State) -> Floats:
+def _turns(problem: Problem, state: State, step: float = 1e-4) -> Floats:
     """What small turns about the origin of the data change in a law, along `State.flat`, (k, r).
 
-    With the generator K of a turn it is ``K f(x) - f'(x) K x``.
+    By differences of so large a turn to both sides.
     """
-    scale, exponents = problem.units.scale, problem.exponents
-    y = np.random.default_rng(0).uniform(-1, 1, (POINTS * len(exponents), problem.d))
-    values, law = monomials(y, exponents), state.coefficients + problem.known
-    slopes = np.einsum("nlk,lj->njk", monomial_gradients(y, exponents), law)
-    changes = []
+    scale, law, changes = problem.units.scale, state.coefficients + problem.known, []
+    whole, away = np.eye(problem.d), state.offset - problem.origin
     for generator in _generators(_places(problem)):
         copies = problem.d // len(generator)
-        turn = np.kron(np.eye(copies), generator) * scale / scale[:, None]
-        moved = np.einsum("njk,nk->nj", slopes, (y + state.offset - problem.origin) @ turn.T)
-        change = np.linalg.pinv(values) @ (values @ law @ turn.T - moved)
-        changes.append(np.append(change.T, np.zeros(problem.d)))
+        turn = step * np.kron(np.eye(copies), generator) * scale / scale[:, None]
+        ahead, behind = (
+            _mapped(problem.exponents, law, whole - by, -by @ away, whole + by)
+            for by in (turn, -turn)
+        )
+        changes.append(np.append((ahead - behind).T / (2 * step), np.zeros(problem.d)))
     return np.column_stack(changes)
+
+
+def _mapped(
+    exponents: Ints, laws: Floats, inward: Floats, origin: Floats, outward: Floats
+) -> Floats:
+    """The laws, (..., l, m), of ``outward f(inward y + origin)``, compared at points enough."""
+    y = np.random.default_rng(0).uniform(-1, 1, (POINTS * len(exponents), exponents.shape[1]))
+    values = monomials(y @ inward.T + origin, exponents) @ laws @ outward.T
+    return np.linalg.pinv(monomials(y, exponents)) @ values
 
 
 def _generators(m: int) -> Floats:
@@ -210,27 +224,6 @@ def turned(angles: ArrayLike, m: int) -> Floats:
     """A rotation of m axes, (m, m), by an angle, or by a vector of three."""
     vector = angles if m == 3 else np.append([0, 0], angles)
     return Rotation.from_rotvec(vector).as_matrix()[:m, :m]
-
-
-def sparse_orientations(
-    law: TurnedLaw, known: Sequence[Floats], rng: np.random.Generator, most: int = 3
-) -> list[Floats]:
-    """Orientations, (m, m), in which a law has fewest terms, distinct, best first.
-
-    Sought from those that are known, from the data's own, and from 20 random ones; by the 40
-    largest directions of uncertainty.
-    """
-    law, m = replace(law, estimates=law.estimates[:41]), law.estimates.shape[2]
-    starts = [*known, np.eye(m), *special_ortho_group.rvs(m, 20, rng)]
-    # A coefficient counts from a tenth of its standard size on, at the end from a hundredth.
-    coarse = sorted((law.descended(turn, np.zeros(m), 0.1) for turn in starts), key=itemgetter(0))
-    fine = [law.descended(turn, origin, 0.01) for _, turn, origin in coarse[: 2 * most]]
-    found: list[Floats] = []
-    for _, turn, _ in sorted(fine, key=itemgetter(0)):
-        near = nearest(turn)
-        if all(apart(near, other) > ALIKE for other in found):
-            found.append(near)
-    return found[:most]
 
 
 def apart(turn: Floats, other: Floats) -> float:
@@ -268,10 +261,7 @@ def check_orientation(orientation: str, library: Library, d: int, origin: str) -
 
 
 def in_sparsest_axes(
-    own: Discovery,
-    pose: Callable[[Floats], Problem],
-    solve: Callable[[Floats], Solved],
-    rng: np.random.Generator,
+    own: Discovery, problem: Problem, solve: Callable[[Floats], Solved], rng: np.random.Generator
 ) -> Solved | None:
     """The law in the axes in which it has fewest terms; none if in no others it has fewer.
 
@@ -279,25 +269,25 @@ def in_sparsest_axes(
     ----------
     own : Discovery
         In the axes of the data.
-    pose, solve : callable
-        The problem, and its solution, in axes that are the rows of (m, m).
+    problem : Problem
+        In these, of places that were seen whole.
+    solve : callable
+        The solution in axes that are the rows of (m, m).
     rng : numpy.random.Generator
         For the starts of the search.
     """
-    starts = rough_orientations(pose(np.eye(own.system.states // own.system.order)), rng)
-    best = min((_settled(turn, solve) for turn in starts), key=_rank, default=None)
+    settled = (_settled(turn, solve) for turn in rough_orientations(problem, rng))
+    best = min(settled, key=_rank, default=None)
     return best if best and _terms(best[0]) < _terms(own) else None
 
 
 def _settled(turn: Floats, solve: Callable[[Floats], Solved]) -> Solved:
     """The law in the best axes near some; of laws alike, the one in the axes that were refined."""
     solved = best = solve(turn)
-    best = replace(best[0], orientation=turn), *best[1:]
     for _ in range(3):  # each law tells the axes better, in which the next is made
         turn, before = refined(*solved[1:]) @ turn, _rank(solved)
         solved = solve(turn)
-        if _rank(solved) <= _rank(best):
-            best = replace(solved[0], orientation=turn), *solved[1:]
+        best = solved if _rank(solved) <= _rank(best) else best
         if _rank(solved) >= before:
             break
     return best

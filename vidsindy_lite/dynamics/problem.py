@@ -104,11 +104,11 @@ class Problem:
     @cached_property
     def functions(self) -> tuple[Function, ...]:
         """Those of the library, of standard points."""
-        centre, scale, sizes = self.units.centre, self.units.scale, self.units.sizes
-        return tuple(
-            function.standardised(centre, scale, size)
-            for function, size in zip(self.form.functions, sizes.tolist(), strict=False)
-        )
+
+        def standard(function: Function, size: float) -> Function:
+            return replace(function, value=lambda x: function.value(self.units.point(x)) / size)
+
+        return tuple(map(standard, self.form.functions, self.units.sizes.tolist()))
 
     def terms(self, x: Floats) -> Floats:
         """All candidate terms at standard points, (n, l); those with a slope are 0."""
@@ -358,28 +358,31 @@ def tightened(problem: Problem, collocation: Collocation, state: State) -> Fit:
 # given a curve to begin with.
 
 
-def with_unseen(problem: Problem, curves: Sequence[BSpline], seen: Bools) -> Problem:
-    """The same with the states that nobody has measured, in standard units with mean 0.
+def with_unseen(
+    form: Form, seen: Bools, curves: Sequence[BSpline], units: Units
+) -> tuple[list[Callable[[Floats], Floats]], Units]:
+    """Curves of all states, also of those that nobody has measured, and their standard units.
 
     Coordinates that were never seen, each told by an equation that is known: of a seen coordinate
     y with ``y' = g + b u``, with b and g known, it is ``u = (y' - g) / b``. Then velocities, and
-    last the time.
+    last the time. In standard units what was not measured has a mean of 0.
 
     Parameters
     ----------
-    problem : Problem
-        Of the coordinates that were seen.
-    curves : sequence of BSpline
-        These, smoothed.
+    form : Form
+        Which equations are known.
     seen : ndarray of bool, shape (m,)
-        Which of all coordinates they are.
+        Which of all coordinates were seen.
+    curves : sequence of BSpline
+        These, smoothed, in their own ``units``.
+    units : Units
 
     Raises
     ------
     ValueError
         If no equation tells a coordinate, or the law is of second order.
     """
-    form, units, m, d = problem.form, problem.units, len(seen), problem.d
+    m, d = len(seen), len(form.names)
     hidden, moves, timed = np.flatnonzero(~seen), form.states > m, form.states < d
     if hidden.size and moves:
         name = form.names[hidden[0]]
@@ -416,23 +419,7 @@ def with_unseen(problem: Problem, curves: Sequence[BSpline], seen: Bools) -> Pro
 
         return states
 
-    def among(values: Floats, filling: float) -> Floats:
-        every = np.full((len(values), d, *values.shape[2:]), filling)
-        every[:, measured] = values
-        return every
-
-    return replace(
-        problem,
-        trajectories=[(t, among(x, np.nan)) for t, x in problem.trajectories],
-        systematic=[among(modes, 0.0) for modes in problem.systematic],
-        smoothed=[among(x, np.nan) for x in problem.smoothed],
-        pulls=np.moveaxis(among(np.moveaxis(among(problem.pulls, 0.0), 1, 0), 0.0), 0, 1),
-        precision=[among(precision, 0.0) for precision in problem.precision],
-        stretches=[(i, (t, among(x, np.nan))) for i, (t, x) in problem.stretches],
-        curves=[standard(curve) for curve in curves],
-        units=Units(centre, scale, units.time),
-        noise=spread_to_unseen(problem.noise, measured),
-    )
+    return [standard(curve) for curve in curves], Units(centre, scale, units.time)
 
 
 def _telling(form: Form, seen: Bools, u: int) -> tuple[int, int]:
@@ -513,27 +500,40 @@ def pose(
         smoothed[i][np.searchsorted(trajectories[i][0], t)] = curve(t * speed)
     modes = [part.compress(seen, axis=1) / scale[:, None] for part in systematic]
     pulls, rest = _shared(trajectories, stretches, modes)
+    d = len(form.names)
+    here, units = np.arange(d) < 0, Units(centre, scale, step / speed)
+    here[: len(seen)] = seen
+
+    def among(values: Floats, filling: float = np.nan) -> Floats:
+        """Values of all states from those of the coordinates that were seen, (n, ...)."""
+        every = np.full((len(values), d, *values.shape[2:]), filling)
+        every[:, here] = values
+        return every
+
+    grown = np.zeros((d, d, pulls.shape[-1]))
+    grown[np.ix_(here, here)] = pulls
+    every_curve: Sequence[Callable[[Floats], Floats]] = curves
+    if not here.all():
+        every_curve, units = with_unseen(form, seen, curves, units)
     problem = Problem(
         measured=measured,
-        trajectories=[(t * speed, values) for t, values in trajectories],
-        systematic=rest,
-        pulls=pulls,
-        smoothed=smoothed,
-        precision=precision,
-        stretches=[(i, (t * speed, values)) for i, (t, values) in stretches],
-        curves=curves,
-        units=Units(centre, scale, step / speed),
-        noise=noise,
+        trajectories=[(t * speed, among(values)) for t, values in trajectories],
+        systematic=[among(part, 0.0) for part in rest],
+        pulls=grown,
+        smoothed=[among(values) for values in smoothed],
+        precision=[among(part, 0.0) for part in precision],
+        stretches=[(i, (t * speed, among(values))) for i, (t, values) in stretches],
+        curves=every_curve,
+        units=units,
+        noise=spread_to_unseen(noise, here),
         form=form,
         penalties=term_penalties(form.exponents, len(seen)),
-        slack=np.ones(len(form.names)),
-        process_noise=np.zeros(len(form.names)),
+        slack=np.ones(d),
+        process_noise=np.zeros(d),
         measured_errors=sigma is not None,
     )
     if problem.shared:
         problem = problem.cautious
-    if seen.sum() < problem.d:
-        problem = with_unseen(problem, curves, seen)
     if form.exponents.shape[1] > len(form.names):
         problem = _with_functions(problem, rng)
     return replace(problem, slack=_slack(problem))

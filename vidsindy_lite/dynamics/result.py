@@ -25,7 +25,7 @@ from ..values import built, decoded, encoded
 from .bspline import smooth
 from .collocation import Fit, WithCurve
 from .data import Trajectory
-from .library import Function, Library, extended, harmonic
+from .library import Function, Library, extended
 from .mechanics import Physics, Quantity, Round, on_circle, physics_of
 from .model import PolynomialSystem, place, with_error
 from .problem import Problem
@@ -482,17 +482,15 @@ class Discovery:
         try:
             found = decoded(content["discovery"], _built)
             values = decoded(content.get("functions"), _built)
-            if values is not None:
+            if values is not None:  # of a file of today
                 values = check_array("functions", values)
             _check_shapes(found)
         except MALFORMED as error:
             raise ValueError(f"{message}: {shown(error)}") from error
-        found = _with_functions(found, library)
-        if values is not None:  # of a file of today
-            _check_alike(found, values)
+        found = _with_functions(found, library, values)
         if found.swing is None:
             return found
-        swung = _with_functions(found.swing.law, None)
+        swung = _with_functions(found.swing.law)
         return replace(found, swing=replace(found.swing, law=swung))
 
     def statement(self) -> str:
@@ -502,8 +500,8 @@ class Discovery:
             lines = [str(self.swing), "a law of its positions, one of many that fit alike:", *lines]
         if self.model_error.any():
             sizes = zip(self.model_error, self.system.names, strict=True)
-            kicks = ", ".join(f"{size:.2g} in {name}" for size, name in sizes if size)
-            lines.append(f"as if kicked at random, by {kicks} over a unit of time")
+            noise = ", ".join(f"{size:.2g} in {name}" for size, name in sizes if size)
+            lines.append(f"process noise: {noise} over a unit of time")
         if said := self.physics().headline:
             lines.append(said)
         if terms := list(unseen(self.native, self.offset, self.curves, self.absent)):
@@ -703,37 +701,41 @@ TYPES: dict[str, Any] = {
 }
 
 
-def _with_functions(found: Discovery, library: Library | None) -> Discovery:
-    """A discovery with the functions of which a file holds the names.
+def _with_functions(
+    found: Discovery, library: Library | None = None, written: Floats | None = None
+) -> Discovery:
+    """A discovery with the functions of which a file holds the names, and values `_values`.
 
     One's own, if the law uses them, are those of a library that holds them.
     """
-    system, names = found.system, found.system.names
-    _, held = (library or Library()).resolve(names, system.d // system.order)
-    known, functions = {function.name: function for function in held}, []
-    written = cast("tuple[str, ...]", system.functions)
-    for name, needed in zip(written, _used(found), strict=True):
-        match = re.fullmatch(r"(sin|cos)\((?:(\d+) )?(\w+)\)", name)
-        if name in known:
-            functions.append(known[name])
-        elif match and match[3] in names:
-            functions.append(harmonic(names, names.index(match[3]), int(match[2] or 1), match[1]))
-        elif not needed:
-            functions.append(Function.unknown(name))
-        else:
+    system, native = found.system, found.native
+    m, names = system.states // system.order, cast("tuple[str, ...]", system.functions)
+    multiples = re.findall(r"(?:sin|cos)\((\d+) ", " ".join(names))
+    _, held = Library.fourier(max(map(int, multiples), default=1)).resolve(system.names, m)
+    held += () if library is None else library.resolve(system.names, m)[1]
+    known = {function.name: function for function in held}
+    rows = (system.support | native.support).any(axis=1)
+    used = system.exponents[rows, system.d : system.d + len(names)].any(axis=0)
+    for name in np.array(names)[used].tolist():
+        if name not in known:
             raise ValueError(
                 f"library: must hold the function {name!r} of the law, as a file holds its name "
                 f"alone; got {library or 'none'}"
             )
-    own, native = (replace(law, functions=tuple(functions)) for law in (system, found.native))
-    return replace(found, system=own, native=native)
-
-
-def _used(found: Discovery) -> Bools:
-    """Which functions of the library are in the law, in either frame."""
-    rows = (found.system.support | found.native.support).any(axis=1)
-    d, k = found.system.d, len(found.system.functions)
-    return np.asarray(found.system.exponents[rows, d : d + k].any(axis=0))
+    functions = tuple(known.get(name, Function.unknown(name)) for name in names)
+    own, native = (replace(law, functions=functions) for law in (system, native))
+    found = replace(found, system=own, native=native)
+    if written is None:
+        return found
+    values = np.where(used, _values(found), written)
+    size = np.abs(written).max(axis=0, where=np.isfinite(written), initial=0.0)
+    alike = np.isclose(values, written, rtol=0, atol=1e-6 * size, equal_nan=True).all(axis=0)
+    if not alike.all():
+        raise ValueError(
+            f"library: must hold the function {names[int(alike.argmin())]!r} that the law was "
+            "found with, got another of that name"
+        )
+    return found
 
 
 def _values(found: Discovery) -> Floats:
@@ -741,19 +743,6 @@ def _values(found: Discovery) -> Floats:
     d, knots = found.system.d, np.concatenate([curve.t for curve in found.curves])
     x = found.curve(np.quantile(knots, np.linspace(0, 1, 20), method="nearest"))
     return extended(x, found.system.functions)[:, d:]
-
-
-def _check_alike(found: Discovery, written: Floats) -> None:
-    """Refuse functions that have other values than when the law was written."""
-    values = np.where(_used(found), _values(found), written)
-    size = np.where(np.isfinite(written), np.abs(written), 0.0).max(axis=0)
-    alike = np.isclose(values, written, rtol=0, atol=1e-6 * size, equal_nan=True).all(axis=0)
-    if not alike.all():
-        name = found.system.functions[int(alike.argmin())].name
-        raise ValueError(
-            f"library: must hold the function {name!r} that the law was found with, got another of "
-            "that name"
-        )
 
 
 def _built(kind: str, parts: dict[str, Any]) -> Any:

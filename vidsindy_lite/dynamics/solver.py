@@ -211,15 +211,15 @@ def _oriented(task: _Task, found: Discovery) -> Discovery:
     """The law in the axes in which it has fewest terms."""
     form = task.form(found.system.order)
 
-    def posed(turn: Floats) -> Problem:
-        probes = np.random.default_rng(task.seed)
-        paths, modes, errors = in_axes(task.measured, turn)
-        return smoother_weights(pose(paths, modes, form, probes, errors))
-
     def solved(turn: Floats) -> Solved:
-        return _solved(replace(task, measured=in_axes(task.measured, turn), turned=True), form)
+        measured = in_axes(task.measured, turn)
+        law, problem, fit = _solved(replace(task, measured=measured, turned=True), form)
+        return replace(law, orientation=turn), problem, fit
 
-    best = in_sparsest_axes(found, posed, solved, np.random.default_rng(task.seed))
+    paths, modes, errors = in_axes(task.measured, np.eye(len(task.names)))
+    probes, rng = (np.random.default_rng(task.seed) for _ in range(2))
+    problem = smoother_weights(pose(paths, modes, form, probes, errors))
+    best = in_sparsest_axes(found, problem, solved, rng)
     if best is None:
         said = "orientation: the data's own axes, as the law has no fewer terms in any others"
         return replace(found, note="; ".join(filter(None, (found.note, said))))

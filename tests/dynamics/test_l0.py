@@ -1,4 +1,4 @@
-"""Sparse regression against brute force over all supports, and the paper's STRidge."""
+"""Sparse regression against brute force over all supports, and exact changes of frame."""
 
 from itertools import product
 
@@ -8,12 +8,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from vidsindy_lite.dynamics import l0 as selection
-from vidsindy_lite.dynamics.l0 import (
-    closest_rival,
-    inverse,
-    subset_path,
-    subset_search,
-)
+from vidsindy_lite.dynamics.frames import ShiftedLaw
+from vidsindy_lite.dynamics.l0 import closest_rival, inverse, subset_path, subset_search
+from vidsindy_lite.dynamics.library import monomial_exponents
+from vidsindy_lite.study import SYSTEMS
 
 
 def objective(information, pull, penalty, support):
@@ -74,22 +72,6 @@ def test_no_single_move_improves_the_result(seed, m, price):
             assert value <= objective(information, pull, penalty, swapped) + tolerance
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_with_clear_data_the_true_support_is_found_from_everything_and_from_nothing(seed):
-    rng = np.random.default_rng(seed)
-    matrix = rng.standard_normal((200, 10))
-    truth = np.zeros(10)
-    truth[rng.choice(10, 3, replace=False)] = rng.choice([-1, 1], 3) * [1.0, 10.0, 100.0]
-    target = matrix @ truth + 0.01 * rng.standard_normal(200)
-    information, pull = matrix.T @ matrix, matrix.T @ target
-    penalty = np.full(10, 0.01)
-    for start in (np.ones(10, dtype=bool), np.zeros(10, dtype=bool)):
-        support, solution, value = subset_search(information, pull, 0 * pull, penalty, start)
-        assert (support == (truth != 0)).all()
-        assert value == pytest.approx(brute_force(information, pull, penalty)[1])
-        np.testing.assert_allclose(solution[support], truth[support], atol=0.01)
-
-
 def test_a_swap_leaves_a_support_that_drops_and_adds_cannot():
     # Column 2 alone explains the target; columns 0 and 2 are nearly the same.
     rng = np.random.default_rng(0)
@@ -123,20 +105,6 @@ def test_a_conserved_quantity_does_not_trap_the_search():
     np.testing.assert_allclose(solution[[0, 4]], [-10, 1], rtol=1e-4)
 
 
-def test_the_closest_rival_is_priced_as_it_is():
-    information, pull = circle()
-    support = np.array([True, False, False, False, True])
-    penalty = np.full(5, 10.0)
-    cost, dropped, added = closest_rival(information, pull, 0 * pull, penalty, support)
-    changed = support.copy()
-    changed[dropped], changed[added] = False, True
-    price = objective(information, pull, penalty, changed)
-    assert cost == pytest.approx(
-        price - objective(information, pull, penalty, support), rel=1e-3, abs=1e-2
-    )
-    assert cost > 9
-
-
 def test_the_closest_rival_may_have_no_term_in_common():
     rng = np.random.default_rng(3)
     columns = rng.standard_normal((200, 3))
@@ -162,17 +130,6 @@ def test_a_path_is_a_search_of_each_share_that_begins_where_the_last_ended(seed,
     for share, found in zip(shares, path, strict=True):
         support, *_ = subset_search(share * information, share * pull, present, penalty, support)
         assert (found == support).all()
-
-
-def test_a_penalty_of_minus_infinity_keeps_a_worthless_column():
-    information, pull = np.eye(3), np.array([5.0, 0.0, 0.1])
-    penalty = np.array([1.0, -np.inf, 1.0])
-    support, solution, value = subset_search(
-        information, pull, 0 * pull, penalty, np.ones(3, dtype=bool)
-    )
-    assert list(support) == [True, True, False]
-    np.testing.assert_allclose(solution, [5, 0, 0])
-    assert value == pytest.approx(1 - 25)
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -222,3 +179,42 @@ def test_a_search_ends_after_so_many_changes(monkeypatch):
     early, solution, _ = subset_search(information, gradient, 0 * truth, penalty, nothing)
     assert not early.any()
     assert not solution.any()
+
+
+# ------------------------------------------------------------------------------------------- frames
+
+
+def algebra(law, relative_error):
+    size = law.coefficients.size
+    return ShiftedLaw(law.exponents, law.coefficients, np.eye(size) / relative_error**2)
+
+
+def test_coefficients_in_another_frame_are_those_of_the_shift():
+    law = SYSTEMS["WangSun"]
+    origin = np.array([1.0, -2.0, 0.5])
+    coefficients, _, _ = algebra(law, 0.1).at(origin)
+    np.testing.assert_allclose(coefficients, law.shift(-origin).coefficients, atol=1e-12)
+
+
+def test_information_in_another_frame_keeps_the_quadratic_form():
+    rng = np.random.default_rng(0)
+    exponents = monomial_exponents(2, 2)
+    factor = rng.normal(size=(12, 12))
+    frames = ShiftedLaw(exponents, rng.normal(size=(6, 2)), factor.T @ factor)
+    delta = rng.normal(size=(6, 2))
+    moved = ShiftedLaw(exponents, frames.coefficients + delta, frames.information)
+    origin = np.array([0.3, -1.2])
+    difference = (moved.at(origin)[0] - frames.at(origin)[0]).T.ravel()
+    expected = delta.T.ravel() @ frames.information @ delta.T.ravel()
+    assert difference @ frames.at(origin)[1] @ difference == pytest.approx(expected)
+
+
+def test_coefficients_are_made_to_vanish():
+    law = SYSTEMS["SprottF"].shift((0.4, -0.3, 0.2))
+    frames = algebra(law, 0.1)
+    entries = np.argwhere((law.support & ~SYSTEMS["SprottF"].support).T)
+    origin = frames.vanish(np.zeros((1, 3)), entries[None])[0]
+    left = frames.at(origin)[0].T[tuple(entries.T)]
+    np.testing.assert_allclose(left, 0, atol=1e-8)
+    (moved,) = frames.vanish(np.array([[0.4, -0.3, 0.2]]), entries[None])
+    np.testing.assert_allclose(moved, (0.4, -0.3, 0.2), atol=1e-12)

@@ -1,10 +1,15 @@
-"""The result: units, error bars, frames, texts, files."""
+"""The result: units, error bars, frames, texts, files, and a picture of its path."""
 
-import time
+import json
+import subprocess
+import sys
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+import vidsindy_lite as vl
+from vidsindy_lite import Library
 from vidsindy_lite.dynamics.data import Units
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.model import PolynomialSystem
@@ -35,14 +40,6 @@ def test_units_turn_a_law_back():
     np.testing.assert_allclose(law(units.point(z)), standard(z) * units.scale / units.time)
 
 
-def test_the_curve_is_in_the_units_of_the_data():
-    law = PolynomialSystem.from_terms({"x": {"y": 2}, "y": {"x": -1, "y": -0.1}})
-    t = 3.0 + 40.0 * np.linspace(0, 20, 300)
-    x = 500.0 + 70.0 * law.simulate((t - 3.0) / 40.0, (1.0, 0.0))
-    curve = discover(t, x, degree=1).curve(t)
-    np.testing.assert_allclose(curve, x, atol=1e-3)
-
-
 def test_equations_show_errors_in_both_frames(found):
     assert "±" in found.equations()
     assert found.equations("data") != found.equations("native")
@@ -68,13 +65,6 @@ def test_covariance_of_the_shift_is_carried_along(found):
     assert np.sqrt(gradient @ covariance @ gradient) == pytest.approx(
         found.offset_errors[0], rel=1e-6
     )
-
-
-def test_text_holds_the_warnings():
-    t = np.linspace(0, 2, 200)
-    x = np.stack([np.sin(t), np.cos(t)], axis=1)
-    short = discover(t, add_noise(x, 0.05, np.random.default_rng(0)))
-    assert "warning: the trajectory covers only" in str(short)
 
 
 # ----------------------------------------------------------------------- to use a law, and keep it
@@ -147,16 +137,6 @@ def test_a_file_that_cannot_be_written_is_told_with_the_argument(spring, tmp_pat
             spring[2].save(path)
 
 
-def test_steps_are_timed_from_the_beginning():
-    law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1}})
-    t = np.linspace(0, 15, 150)
-    began = time.perf_counter()
-    history = discover(t, law.simulate(t, (1.0, 0.0)), degree=1).history
-    ended = time.perf_counter() - began
-    seconds = [step.seconds for step in history]
-    assert 0 <= seconds[0] <= seconds[-1] <= ended
-
-
 def test_a_curve_forgives_the_rounding_of_its_ends_in_proportion_to_its_length(found):
     low, high = found.curves[0].t[[0, -1]]
     near, far = (share * (high - low) for share in (1e-10, 1e-6))
@@ -177,3 +157,72 @@ def test_a_curve_forgives_the_rounding_of_its_ends_in_proportion_to_its_length(f
 )
 def test_numbers_have_the_digits_that_their_errors_allow(number, text):
     assert _with_error(*number, "x") == text
+
+
+# ------------------------------------------------------------------ functions of one's own in files
+
+T = np.linspace(0, 20, 400)
+HELD = Library.terms({"restoring": lambda x: np.sin(x), "away": lambda x: 1 / (4 - x)})
+
+
+@pytest.fixture(scope="module")
+def pendulum():
+    """A pendulum's law among two functions, of which it has one."""
+    terms = {"x": {"vx": 1.0}, "vx": {"sin(x)": -9.81, "vx": -0.1}}
+    law = PolynomialSystem.from_terms(terms, library=Library.polynomial(1) + Library.fourier(1))
+    x = law.simulate(T, [1.5, 0.0])[:, :1]
+    x += 0.01 * x.std() * np.random.default_rng(0).normal(size=x.shape)
+    found = vl.discover(T, x, order=2, library=Library.polynomial(1) + HELD)
+    used = found.system.exponents[found.system.support.any(axis=1), 2:].any(axis=0)
+    assert used.tolist() == [True, False]
+    return found
+
+
+def test_another_function_of_the_same_name_is_refused(pendulum, tmp_path):
+    pendulum.save(tmp_path / "law")
+    for other in (lambda x: np.tanh(x), lambda x: 1.001 * np.sin(x), lambda x: x * np.nan):
+        with pytest.raises(ValueError, match="library: .* function 'restoring' that the law was"):
+            vl.Discovery.load(tmp_path / "law", Library.terms({"restoring": other}))
+    # What a file of an earlier version does not hold is not compared.
+    content = json.loads((tmp_path / "law").read_text())
+    del content["functions"]
+    (tmp_path / "old").write_text(json.dumps(content))
+    assert vl.Discovery.load(tmp_path / "old", HELD).equations() == pendulum.equations()
+
+
+def test_functions_that_the_law_has_not_may_be_missing(pendulum, tmp_path):
+    pendulum.save(tmp_path / "law")
+    again = vl.Discovery.load(tmp_path / "law", Library.terms({"restoring": lambda x: np.sin(x)}))
+    state = np.array([[0.3, 1.0], [-1.0, 0.5]])
+    np.testing.assert_array_equal(again.predict(state), pendulum.predict(state))
+    np.testing.assert_array_equal(again.system.gradient(state), pendulum.system.gradient(state))
+    np.testing.assert_array_equal(again.simulate(state[0], T).x, pendulum.simulate(state[0], T).x)
+    assert again.equations() == pendulum.equations()
+    assert np.isnan(again.system.library(state)[:, again.terms.index("away")]).all()
+    assert str(again).startswith(pendulum.equations())
+    again.save(tmp_path / "copy")
+    assert str(vl.Discovery.load(tmp_path / "copy", HELD)) == str(pendulum)
+
+
+# ----------------------------------------------------------------------------------------- the path
+
+
+def test_every_plateau_is_drawn_and_the_law_is_marked_where_it_holds(found):
+    figure = found.plot_path()
+    assert [axes.get_title() for axes in figure.axes] == ["dx/dt", "dy/dt"]
+    for j, (axes, plateaus) in enumerate(zip(figure.axes, found.path, strict=True)):
+        (stairs,) = axes.patches
+        values, edges, _ = stairs.get_data()
+        assert list(values) == [p.terms.sum() for p in plateaus]
+        np.testing.assert_allclose(edges, [plateaus[0].low, *(p.high for p in plateaus)])
+        own = [p for p in plateaus if (p.terms == found.native.support[:, j]).all()]
+        marks = [marked.get_segments()[0][:, 0] for marked in axes.collections]
+        np.testing.assert_allclose(marks, [(p.low, p.high) for p in own])
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.texts] == ["all laws", "the law"]
+    plt.close(figure)
+
+
+def test_matplotlib_waits_until_something_is_drawn():
+    code = "import sys, vidsindy_lite.dynamics; assert 'matplotlib' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)
