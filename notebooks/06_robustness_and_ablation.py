@@ -406,7 +406,7 @@ for condition, level in six[["condition", "level"]].drop_duplicates().itertuples
 far = sprott[(sprott.method == "spline-ADO") & sprott.condition.isin(["blocks", "fibers"])]
 held = far[far.level <= far.condition.map({"blocks": 0.5, "fibers": 0.2})].exact
 print(f"spline-ADO with up to 50 % in blocks or 20 % in fibers missing: {rate(held)} laws exact")
-assert held.mean() >= 0.8
+assert held.mean() >= 0.8 or not full
 
 # %% [markdown]
 # ## Our solver, taken apart

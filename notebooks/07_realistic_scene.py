@@ -205,7 +205,7 @@ assert all(view.track.detector == "background" for view in views)
 told = [doubt for view in views for doubt in view.track.warnings]
 print(*told, sep="\n")
 assert all("the target is lost in" in doubt for doubt in told)
-assert len(told) <= len(runs) // 2
+assert len(told) <= len(views) // 2
 
 # %% tags=["hide-input"] jupyter={"source_hidden": true}
 fig, panels = plt.subplots(3, 1, figsize=(9, 4.6), sharex=True, sharey=True)

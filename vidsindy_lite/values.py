@@ -121,6 +121,7 @@ def built(kind: type, parts: dict[str, Any], known: dict[str, Any]) -> Any:
 def _is_of(value: Any, hint: Any) -> bool:
     """Whether a value is of the type of an annotation, those of its items included."""
     origin, inner = get_origin(hint), get_args(hint)
+    origin = get_origin(getattr(origin, "__value__", hint))  # of an alias, as newer numpys have it
     if hint is Any:
         return True
     if origin in (Union, UnionType):

@@ -256,10 +256,25 @@ def test_it_is_followed_both_ways_from_where_it_is_known(tmp_path):
     found = Candidates.of(5, np.eye(3), np.column_stack(
         [two, two - 8, np.full((2, 2), 17.0), np.full(2, 200.0), np.zeros((2, 6)), np.ones(2)]
     ))  # fmt: skip
-    looks = followed(frames, maps, found, (10, PLACES[10], np.array([17.0, 17])))
+    looks = followed(frames, maps, found, (10, PLACES[10], np.array([17.0, 17])), np.zeros(2))
     shown = ~np.isin(np.arange(N), hidden)
     assert np.linalg.norm(looks.box[shown, :2] - PLACES[shown], axis=1).max() < 1.5
     assert looks.fit[10] == 1
     assert looks.fit[list(hidden)].max() < looks.fit[shown].min()
     assert looks.like[0] > 0.8
     assert looks.like[1] < 0.4
+
+
+def test_what_is_fast_is_looked_for_where_it_goes(tmp_path):
+    # Four frames across the image: each is beyond what is seen around the place before.
+    places = np.column_stack([np.linspace(20, 140, 4), np.linspace(30, 90, 4)])
+    frames = Reel(write_video(tmp_path / "film.mov", iter([drawn(place) for place in places])))
+    maps, size = np.tile(np.eye(3), (4, 1, 1)), np.array([17.0, 17])
+    nothing = Candidates.of(np.zeros(0, int), np.eye(3), np.zeros((0, 14)))
+
+    def followed_at(pace):
+        return followed(frames, maps, nothing, (1, places[1], size), pace).box[:, :2]
+
+    assert np.linalg.norm(followed_at(places[1] - places[0]) - places, axis=1).max() < 1.5
+    stays = followed_at(np.zeros(2))[[0, 2, 3]]
+    assert not (np.linalg.norm(stays - places[[0, 2, 3]], axis=1) < 10).any()

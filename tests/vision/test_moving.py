@@ -353,3 +353,38 @@ def test_clips_without_reference_have_smooth_tracks(name, first):
     # Before its turning points the pendulum is lost, on some processors for a dozen frames more.
     assert (at >= first).sum() >= 0.7 * (len(found.pixels) - first)
     assert scatter(at, found.pixels[at]) < 2
+
+
+def lit_unevenly(radius, frames=80, seed=3):
+    """A red ball of some pixels that circles before texture, in light that flickers."""
+    rng = np.random.default_rng(seed)
+    ground = sum(
+        s * cv2.GaussianBlur(rng.normal(size=(240, 480, 3)), (0, 0), s) for s in (2, 8, 32)
+    )
+    ground = 110 + 35 * ground / ground.std()
+    turn = np.linspace(0, 4 * np.pi, frames)
+    truth = np.column_stack([240 + 170 * np.cos(turn), 120 + 80 * np.sin(turn)])
+    for k, place in enumerate(truth):
+        image = ground.copy()
+        middle = [round(16 * v) for v in place]
+        cv2.circle(image, middle, 16 * radius, (220, 30, 30), -1, cv2.LINE_AA, 4)
+        image *= 1 + 0.05 * np.sin(0.7 * k)
+        yield place, np.clip(image + rng.normal(0, 2, image.shape), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("half", [5, 8])
+def test_a_small_target_is_followed_from_a_box_that_is_drawn_loosely(tmp_path, half):
+    truth, images = map(np.array, zip(*lit_unevenly(3), strict=True))
+    path = write_video(tmp_path / "clip.mov", iter(images))
+    box = (*(truth[10] - half), 2 * half, 2 * half)
+    found, error = errors(path, truth, Hint(frame=10, box=box))
+    assert np.nanmax(error) < 1.5
+    assert np.isfinite(error).mean() > 0.9
+    assert found.warnings == ()
+
+
+def test_a_box_in_which_nothing_moves_is_followed_by_its_looks_and_told(tmp_path):
+    truth, images = map(np.array, zip(*lit_unevenly(8), strict=True))
+    path = write_video(tmp_path / "clip.mov", iter(images))
+    found = track(path, target=Hint(frame=10, box=(230, 110, 20, 20)))
+    assert "looks alone" in " ".join(found.warnings)

@@ -138,11 +138,13 @@ def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
     `samples` are frames spread evenly over the film, see `sample_frames`.
     """
     film = Film.of(frames, samples)
-    n, boxes = len(film.maps), None
+    n, boxes, seed = len(film.maps), None, None
     for _ in range(4):  # of a target that covers its own ground, until the ground is without it
         seen, lights = sighted(film, boxes)
         n = min(n, len(lights))
-        seed = None if hint is None else hint.boxed(frames.info.size, n, film.factor)
+        if hint is not None and boxes is None:
+            boxed = hint.boxed(frames.info.size, n, film.factor)
+            seed = boxed and _tightened(seen, boxed)
         paths = _paths(seen, hint, seed)
         if not paths and seed is None:
             return nothing(film.motion, n)
@@ -205,6 +207,18 @@ def _paths(
         liked = seen._replace(quality=seen.quality * hint.likeness(seen.colour, seen.behind))
     # Of less, noise is made.
     return [path for path in plainest_paths(liked) if np.median(seen.quality[path.rows]) > 0.2]
+
+
+def _tightened(seen: Candidates, seed: tuple[int, Floats, Floats]) -> tuple[int, Floats, Floats]:
+    """A box that is drawn loosely around one plain thing, close around it."""
+    frame, centre, size = seed
+    here = (seen.frame == frame) & (np.abs(seen.centre - centre) < size / 4).all(axis=1)
+    inside = np.flatnonzero(here & (seen.box[:, 2:] < size).all(axis=1) & (seen.quality > 0.8))
+    if not len(inside):
+        return seed
+    best = inside[seen.area[inside].argmax()]
+    loose = seen.area[best] < 0.4 * 0.7 * size.prod()
+    return (frame, seen.centre[best], np.maximum(seen.box[best, 2:], 4)) if loose else seed
 
 
 def _plainest(seen: Candidates, rows: Ints) -> tuple[int, Floats, Floats]:
