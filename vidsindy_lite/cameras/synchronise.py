@@ -4,7 +4,7 @@ Two cameras see one point only if they look at the same instant; otherwise their
 each other, and no camera can mend it. So the lags are those of the smallest reprojection error, and
 are found in three steps:
 
-1. pair by pair, with a calibrated camera: the epipolar equation (`triangulate.epipolar_lines`) is
+1. pair by pair, with a calibrated camera: the epipolar equation (`rig.epipolar_lines`) is
    linear in what is unknown of the other camera, and is solved at all whole lags at once. It is
    solved a second time with a shift of the other image, which takes up most of what a badly
    measured normal or position does;
