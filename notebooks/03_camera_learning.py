@@ -178,9 +178,9 @@ assert np.abs(cameras.calibration_errors(learned, truth)).max() < 1e-9
 #
 # The columns of $\mathbf Q$ are orthogonal to all that a point in space can cause; what is left along them is
 # disagreement of the views. Eq. (4) uses two of the conditions. The third is the *epipolar* condition between cameras 2 and 3, which the
-# least-squares "inverse" absorbs. `learn_cameras` uses all three, still linear, and then
-# polishes the result to the smallest reprojection error: the distance, in pixels, between what a camera saw
-# and where it would see the reconstructed point.
+# least-squares "inverse" absorbs. `learn_cameras` begins, still linear, with the epipolar conditions between the
+# calibrated camera and each of the others, and then goes to the smallest reprojection error: the distance, in pixels,
+# between what a camera saw and where it would see the reconstructed point. That holds all three.
 
 # %%
 first, second, third = (camera.rows for camera in truth.cameras)
