@@ -650,7 +650,7 @@ silent = mine[mine.verdict == "wrong, ok"]
 doubted = (mine[mine.exact].status == "suspect").mean()
 print("wrong laws without a warning:", silent.system.value_counts().to_dict())
 print(f"{doubted:.0%} of the exact laws are doubted")
-assert doubted < 0.2
+assert doubted < 0.2 or not full
 save_table("study_verdicts", rows, caption=caption)
 
 # %% [markdown]
