@@ -8,6 +8,7 @@ The search and MathJax lie in the folder: the pages need no network and no serve
 import json
 import re
 import subprocess
+from functools import cache
 from pathlib import Path
 
 import jupyter_server_mathjax
@@ -118,10 +119,14 @@ def prepare(app, page, source):
     if page == "README":
         source[0] += CONTENTS
     elif page.startswith("notebooks/"):
-        found = subprocess.run(
-            ["git", "remote", "get-url", "origin"], cwd=ROOT, capture_output=True, text=True
-        )
-        source[0] = json.dumps(described(json.loads(source[0]), launchers(page, found.stdout)))
+        source[0] = json.dumps(described(json.loads(source[0]), launchers(page, origin())))
+
+
+@cache
+def origin():
+    """The address of the repository that this is a clone of, empty if of none."""
+    asked = ["git", "remote", "get-url", "origin"]
+    return subprocess.run(asked, cwd=ROOT, capture_output=True, text=True).stdout
 
 
 def launchers(page, origin):

@@ -130,8 +130,6 @@ def _is_of(value: Any, hint: Any) -> bool:
         return isinstance(value, tuple) and all(_is_of(item, inner[0]) for item in value)
     if hint in (float, int):
         return isinstance(value, hint | int) and not isinstance(value, bool)
-    if origin is np.ndarray:
-        return isinstance(value, np.ndarray)
     return value is None if hint is NoneType else isinstance(value, origin or hint)
 
 

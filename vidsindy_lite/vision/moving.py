@@ -39,8 +39,6 @@ from .steadying import CameraMotion, at_rest, carry, rescaled
 from .video import Reel, reduce
 
 _SHORTEST = 5  # frames of a path
-
-
 _LOOKS_ALONE = "no view tells it from its ground: it is followed by its looks alone"
 
 
@@ -290,12 +288,9 @@ def _together(
     centre, worth = box[:, :2], np.clip(1.2 * looks.fit[at], 0.25, 0.8)
     colour = np.zeros((len(at), 3))
     colour[:] = np.median(seen.colour, axis=0) if len(seen.colour) else 0
-    bounds = np.searchsorted(seen.frame, np.arange(len(maps) + 1))
     for k, i in enumerate(at.tolist()):
-        here = np.arange(bounds[i], bounds[i + 1])
-        apart = np.linalg.norm(seen.centre[here] - centre[k], axis=1)
-        near = here[(apart < 0.35 * np.sqrt(area[k]) + 1)
-                    & (np.abs(np.log(seen.area[here] / area[k])) < 0.8)]  # fmt: skip
+        there = _there(seen, i, centre[k], area[k])
+        near = there[np.abs(np.log(seen.area[there] / area[k])) < 0.8]
         if len(near):
             best = near[quality[near].argmax()]
             colour[k] = seen.colour[best]
@@ -309,14 +304,17 @@ def _together(
     return Candidates.joined([seen._replace(quality=quality).only(kept), alike])
 
 
+def _there(seen: Candidates, frame: int, centre: Floats, area: float) -> Ints:
+    """The candidates of a frame in the inner part of a thing of such an area."""
+    here = np.flatnonzero(seen.frame == frame)
+    apart = np.linalg.norm(seen.centre[here] - centre, axis=1)
+    return here[apart < 0.35 * np.sqrt(area) + 1]
+
+
 def _differing(seen: Candidates, path: Candidates) -> float:
     """In what share of its frames something is seen to differ where a path leads."""
-    reach = 0.35 * np.sqrt(path.area) + 1
-    apart = [
-        np.linalg.norm(seen.centre[seen.frame == i] - centre, axis=1).min(initial=np.inf)
-        for i, centre in zip(path.frame, path.centre, strict=True)
-    ]
-    return float((apart < reach).mean())
+    places = zip(path.frame, path.centre, path.area, strict=True)
+    return float(np.mean([len(_there(seen, *place)) > 0 for place in places]))
 
 
 def lens_of(samples: Image, film: Film, *ways: Ways) -> Lens:
