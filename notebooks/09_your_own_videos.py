@@ -220,7 +220,7 @@ save_table("own_codec", rows, caption="Laws from videos in mp4v at a low bit rat
 
 # %% [markdown]
 # The coefficients are still good to a thousandth, as the solver allows for trails
-# (`cameras.trailing_errors`). The errors of the tracks last for several frames, and what lasts looks like
+# (`cameras.tracking_errors`). The errors of the tracks last for several frames, and what lasts looks like
 # terms that were left out: the solver counts that in, but a small false term or the verdict "suspect" remain
 # possible. Film at a high bit rate if you can.
 #

@@ -42,7 +42,7 @@ from .cameras import (
     smooth,
     stacked,
     systematic_errors,
-    trailing_errors,
+    tracking_errors,
 )
 from .checks import (
     check_choice,
@@ -306,7 +306,7 @@ def _observed(
             if far is not None:
                 tracks = align(raw, far.lags.frames, clock.rates, clock.uneven)
                 warnings = (*far.lags.warnings, *doubts)
-                return _concluded(tracks, far.rig, far.lags, clock, [], warnings, far.moving)
+                return _concluded(raw, tracks, far.rig, far.lags, clock, [], warnings, far.moving)
             doubts = (*rig.warnings, *doubts)
     first: list[str] = []
     start = lags
@@ -339,10 +339,11 @@ def _observed(
     modes = systematic_errors(raw, rig, learned, told)
     disagreeing = _rig_warnings(missed, tracks, rig, learned, names, used, best)
     warnings = (*first, *disagreeing, *learned.warnings, *doubts, *told.warnings)
-    return _concluded(tracks, learned, told, clock, modes, warnings)
+    return _concluded(raw, tracks, learned, told, clock, modes, warnings)
 
 
 def _concluded(
+    raw: Sequence[Floats],
     tracks: tuple[Floats, ...],
     rig: Rig,
     lags: Lags,
@@ -353,10 +354,11 @@ def _concluded(
 ) -> Observation:
     """The path that cameras have seen which are known now, along so many axes.
 
-    Its errors are the modes and what every smooth path trails behind with.
+    Its errors are the modes and what the tracks of all frames share.
     """
     motion = [_smoothed(clock.times, track) for track in tracks]
-    errors, moves = np.stack([*modes, *trailing_errors(tracks, rig, motion)]), np.arange(3) < moving
+    errors = np.stack([*modes, *tracking_errors(tracks, rig, motion, raw)])
+    moves = np.arange(3) < moving
     x = reconstruct(tracks, rig) * moves
     return Observation(tracks, rig, lags, clock.times, x, errors * moves, warnings)
 

@@ -82,7 +82,7 @@ def test_arguments_are_checked_once():
         learned = vl.learn_cameras(aligned, start)
         vl.reconstruct(aligned, learned)
         cameras.systematic_errors(tracks, start, learned, lags)
-        cameras.trailing_errors(aligned, learned)
+        cameras.tracking_errors(aligned, learned)
 
     profile = cProfile.Profile()
     profile.runcall(run)

@@ -6,7 +6,7 @@ from helpers import dependent, trajectory
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
-from vidsindy_lite.cameras import Lags, systematic_errors, trailing_errors
+from vidsindy_lite.cameras import Lags, systematic_errors, tracking_errors
 
 NOISE = 0.05  # pixels
 
@@ -84,7 +84,7 @@ def test_no_trail_where_nothing_moves_or_is_seen():
     for track in tracks:
         track[80:] = np.nan
     tracks[0][:20] += NOISE * np.random.default_rng(0).normal(size=(20, 2))
-    modes = trailing_errors(tracks, rig)
+    modes = tracking_errors(tracks, rig)
     assert np.isfinite(modes).all()
     np.testing.assert_allclose(modes[:, 41:59], 0, atol=1e-12)
     np.testing.assert_array_equal(modes[:, 80:], 0)
@@ -98,7 +98,7 @@ def test_trailing_tracks_make_false_terms_unless_it_is_told():
     tracks = trailing(rig, x, 0.5 * NOISE)
     seen = vl.reconstruct(tracks, rig)
     blind = vl.discover(t, seen)
-    told = vl.discover(t, seen, systematic=trailing_errors(tracks, rig))
+    told = vl.discover(t, seen, systematic=tracking_errors(tracks, rig))
     assert study.score(blind, truth).false_positives > 0
     assert study.score(told, truth).exact
     assert told.status == "ok"
@@ -111,7 +111,7 @@ def test_trails_follow_the_motion():
     rng = np.random.default_rng(5)
     tracks = [c.project(x) + 0.3 * rng.normal(size=(80, 2)) for c in rig.cameras]
     tracks[1][20] = np.nan
-    modes = trailing_errors(tracks, rig)
+    modes = tracking_errors(tracks, rig)
     assert modes.shape == (3, 80, 3)
     path = vl.reconstruct(tracks, rig)
     missed = np.hstack(vl.residuals(tracks, rig))
@@ -186,3 +186,31 @@ def test_a_clock_that_may_drift_moves_the_path_at_both_ends():
     assert shift[90:110].max() < 0.2 * np.quantile(shift, 0.9)
     exact = Lags(np.zeros(3), np.ones(3), np.zeros(3), 0.0)
     assert systematic_errors(tracks, rig, rig, exact).shape == (0, 200, 3)
+
+
+def test_rounded_tracks_may_lie_beside_the_target():
+    """As far as a place within their step is uncertain, whatever the step and the lags."""
+    x = trajectory(np.random.default_rng(6), 80)
+    rig = vl.Rig.around(x)
+    tracks = [camera.project(x) for camera in rig.cameras]
+    trails = len(tracks)
+    assert len(tracking_errors(tracks, rig)) == trails
+    for step in (0.5, 1.0, 3.0):
+        rounded = [step * np.round(track / step) for track in tracks]
+        rounded[0][5] = np.nan
+        modes = tracking_errors(tracks, rig, raw=rounded)[trails:]
+        beside = [track + step / np.sqrt(12) * np.array([1.0, -2.0]) for track in tracks]
+        shift = vl.reconstruct(beside, rig) - vl.reconstruct(tracks, rig)
+        np.testing.assert_allclose(modes[::2].sum(axis=0) - 2 * modes[1::2].sum(axis=0), shift)
+
+
+def test_a_law_of_marks_beside_the_target_has_no_terms_of_their_distance():
+    truth = study.SYSTEMS["WangSun"].shift(study.REFERENCE_OFFSET)
+    t, x = truth.trajectory(1000)
+    rig = vl.Rig.around(x)
+    rounded = [np.round(camera.project(x) + np.array([0.05, 0.25])) for camera in rig.cameras]
+    seen = vl.observe_tracks(rounded, rig, t, lags="synchronous")
+    blind = vl.discover(t, seen.x, order=1)
+    told = vl.discover(t, seen.x, systematic=seen.systematic, order=1)
+    assert study.score(blind, truth).false_positives > 0
+    assert study.score(told, truth).exact

@@ -17,7 +17,7 @@ The other rooms import from here alone.
 
 from .adjust import explain, smooth
 from .calibrate import calibration_errors, check_learnable, learn_cameras, learn_cameras_eq4
-from .calibrate import systematic_errors, trailing_errors
+from .calibrate import systematic_errors, tracking_errors
 from .clocks import Clock, Lags, align, list_lags
 from .files import read_calibration
 from .models import AffineCamera, Camera, OrthographicCamera, PerspectiveCamera

@@ -16,7 +16,7 @@ fitted to such a path has small terms that the true one has not. `discover` take
 errors into account if it is told them, (k, n, 3). The covariance of what was learned does not rest
 on independent errors of the tracks, which compression makes similar from frame to frame. A
 direction that the tracks tell nothing of, such as a turn of the whole rig, is as uncertain as the
-measurements leave it. And the tracks themselves may share an error: see `trailing_errors`.
+measurements leave it. And the tracks themselves may share an error: see `tracking_errors`.
 
 Paper: Section "Coordinates Transformation", Eq. (4), (5).
 """
@@ -444,14 +444,19 @@ def _of_shape(modes: Floats, x: Floats) -> Floats:
     return (flat - flat @ frame @ frame.T).reshape(modes.shape)
 
 
-def trailing_errors(
-    tracks: Sequence[Floats], rig: Rig, motion: Sequence[Floats] | None = None
+def tracking_errors(
+    tracks: Sequence[Floats],
+    rig: Rig,
+    motion: Sequence[Floats] | None = None,
+    raw: Sequence[Floats] | None = None,
 ) -> Floats:
-    """Errors of the reconstructed path if tracks stay a constant distance behind the motion.
+    """Errors of the reconstructed path that the tracks of all frames share.
 
     A codec that codes changes leaves out the smallest ones, so that a trace of the target stays
-    where it just was, and the track behind. The residuals show little of it, because all views do
-    it alike; so it is allowed for in proportion to the noise that they do show.
+    where it just was, and the track a constant distance behind the motion. And a detector that
+    marks whole pixels may mark corners or middles, so that all of a track lies beside the target by
+    part of a pixel. The residuals show little of either, because all views do it alike. The trail
+    is allowed for in proportion to the noise that they do show, the place by the pixels' step.
 
     Parameters
     ----------
@@ -461,11 +466,14 @@ def trailing_errors(
         All cameras calibrated.
     motion : sequence of ndarray, shape (n, 2), optional
         The tracks without their noise; by default the tracks themselves.
+    raw : sequence of ndarray, shape (n_i, 2), optional
+        The tracks as they were before they were interpolated to these instants, if they were.
 
     Returns
     -------
     ndarray, shape (m, n, 3)
-        Scene units; what the trail of each camera, one standard deviation long, adds to the path.
+        Scene units; what the trail of each camera, one standard deviation long, adds to the path,
+        and then what a shift of its track does, in u and in v, if that is rounded.
         Zero where nothing can be reconstructed.
     """
     check_calibrated("rig", rig)
@@ -475,12 +483,24 @@ def trailing_errors(
     count = left.shape[1]
     left = np.abs(left[np.isfinite(left)])
     noise = 1.4826 * np.median(left) * np.sqrt(count / (count - 3)) if left.size else 0.0
-    modes = []
+    shifts = []
     for i, track in enumerate(views):
         step = np.gradient(track if motion is None else motion[i], axis=0)
         # Noise has no direction: the trail ends where the target moves by less than that.
         length = np.sqrt((step**2).sum(axis=1, keepdims=True) + noise**2)
-        trail = _TRAIL * noise * np.nan_to_num(step / np.maximum(length, 1e-300))
-        moved = [*views[:i], track - trail, *views[i + 1 :]]
-        modes.append(intersect(rig.cameras, moved)[0] - x)
-    return np.nan_to_num(np.array(modes))
+        shifts.append((i, -_TRAIL * noise * np.nan_to_num(step / np.maximum(length, 1e-300))))
+    for i, track in enumerate(views if raw is None else raw):
+        place = _step(track) / np.sqrt(12)  # of what lies anywhere in a step with equal chance
+        shifts += [(i, place * axis) for axis in np.eye(2) if place]
+    moved = ([*views[:i], views[i] + shift, *views[i + 1 :]] for i, shift in shifts)
+    return np.nan_to_num([intersect(rig.cameras, those)[0] - x for those in moved])
+
+
+def _step(track: Floats) -> float:
+    """The step that all pixels of a track, (n, 2), are multiples of; 0 if they are not rounded."""
+    seen = track[np.isfinite(track).all(axis=1)]
+    places = np.unique(seen - seen.min(axis=0, initial=np.inf))
+    if len(places) < 4:  # of which nothing can be said
+        return 0.0
+    steps = places / np.diff(places).min()
+    return float(places[1] / steps[1]) if np.allclose(steps, np.round(steps), atol=1e-6) else 0.0
