@@ -355,29 +355,32 @@ def at_own_errors(problem: Problem, fit: Fit) -> Fit:
 
 
 def refit(problem: Problem, path: Path, history: History, most: int = 4) -> Fit:
-    """The law of the widest plateaus of a path; where such a law has a pole, of the next ones.
+    """The law of the widest plateaus of a path; where it is not what they promise, of the next.
 
-    At ``most`` so many choices of plateaus are fitted.
+    A plateau is told by the quadratic model around another law: fitted, its own may have a pole, or
+    miss the data by more than is tolerated where the plateau begins. At ``most`` so many choices of
+    plateaus are fitted.
     """
     ranked = path.ranked()
     for _ in range(most):
         goal = [plateaus[0] for plateaus in ranked]
-        fit = _refitted(problem, path, goal, history)
-        if np.isfinite(fit.collocation.objective(fit.state)):
-            return fit
         highest = max(goal, key=lambda plateau: plateau.low)
+        tolerated = max(highest.low / path.own, 1.0)
+        tolerant = replace(problem, noise=errors_left(problem, path.fit) * tolerated)
+        fit = _refitted(tolerant, path, goal, history)
+        promised = CONSISTENT * tolerant.noise
+        if np.isfinite(fit.criterion) and (residual_noise(fit) <= promised).all():
+            return fit
         ranked[highest.equation].remove(highest)
         if not ranked[highest.equation]:
             break
     return path.fit
 
 
-def _refitted(problem: Problem, path: Path, goal: Sequence[Plateau], history: History) -> Fit:
+def _refitted(tolerant: Problem, path: Path, goal: Sequence[Plateau], history: History) -> Fit:
     """The law of these plateaus, fitted and framed where they begin."""
     fit = path.fit
     active = fit.state.whole(np.stack([plateau.terms for plateau in goal], axis=1))
-    tolerated = max(max(plateau.low for plateau in goal) / path.own, 1.0)
-    tolerant = replace(problem, noise=errors_left(problem, fit) * tolerated)
     collocation = fit.collocation.weighted(tolerant.noise**-2, fit.collocation.physics_weights)
     trial = tightened(tolerant, collocation, _restricted(path, active))
     trial = replace(trial, criterion=tolerant.criterion(trial.collocation, trial.state))
