@@ -58,24 +58,6 @@ def test_even_knots_are_as_far_apart_as_asked_for_or_closer(spacing):
     assert 1 / (len(gaps) - 1) > spacing if len(gaps) > 1 else spacing >= 1
 
 
-def test_matrices_hold_the_segments_side_by_side():
-    segments = pieces()
-    grid = Grid.of(segments)
-    sizes = [len(s.breakpoints) + 2 for s in segments]
-    assert grid.starts.tolist() == [0, sizes[0], sum(sizes)]
-    assert grid.r == sum(sizes)
-    for rows, columns, segment, knots in zip(
-        (slice(0, 9), slice(9, 18)),
-        (slice(0, sizes[0]), slice(sizes[0], None)),
-        segments,
-        grid.knots,
-        strict=True,
-    ):
-        dense = grid.samples.toarray()[rows]
-        np.testing.assert_allclose(dense[:, columns], design_matrix(knots, segment.t))
-        assert dense.sum() == pytest.approx(9)
-
-
 def test_nodes_are_midpoints_and_ends():
     segments = pieces()
     grid = Grid.of(segments)
@@ -118,22 +100,6 @@ def test_node_weights_are_the_lengths_that_nodes_stand_for():
 BLOCK = 48  # rows that are solved at once
 
 
-@pytest.mark.parametrize("alike", [1, 2])
-def test_the_band_is_that_of_the_normal_matrix(alike):
-    rng = np.random.default_rng(1)
-    first = np.sort(rng.integers(0, 7, 20)).repeat(alike)
-    rows, weights = (
-        rows_from(first, rng.normal(size=(len(first), 3)), 9),
-        rng.uniform(1, 2, len(first)),
-    )
-    dense = rows.toarray()
-    assert np.count_nonzero(dense) == 3 * len(first)
-    for known, full in ((None, dense.T @ dense), (weights, (dense.T * weights) @ dense)):
-        band = normal_band(rows, known, alike)
-        for lag in range(3):
-            np.testing.assert_allclose(band[lag, : 9 - lag], np.diag(full, -lag), atol=1e-12)
-
-
 @pytest.mark.parametrize("n", [1, 7, BLOCK, 2 * BLOCK + 1, 3 * BLOCK - 1])
 @pytest.mark.parametrize("reach", [3, 11, BLOCK + 5])
 def test_many_right_hand_sides_are_solved_for(n, reach):
@@ -172,14 +138,6 @@ def test_nothing_is_smoothed_across_a_gap():
     left, right = smooth(halves, np.random.default_rng(0)).splines
     np.testing.assert_allclose(left(t[:50]), 0, atol=1e-8)
     np.testing.assert_allclose(right(t[51:]), 1, atol=1e-8)
-
-
-def test_a_line_is_reproduced_on_uneven_times():
-    rng = np.random.default_rng(1)
-    t = np.sort(rng.uniform(0, 5, 200))
-    line = 2 * t[:, None] - 1
-    spline = smooth([(t, line)], rng).splines[0]
-    np.testing.assert_allclose(spline(t), line, atol=1e-6)
 
 
 def dense(band):

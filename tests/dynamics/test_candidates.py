@@ -60,13 +60,6 @@ def speed(vx, vy, vz):
 
 
 DRAG = Library.terms({"|v|v": lambda vx, vy, vz: speed(vx, vy, vz) * np.array([vx, vy, vz])})
-SEPARATE = Library.terms(
-    {
-        "|v|vx": lambda vx, vy, vz: speed(vx, vy, vz) * vx,
-        "|v|vy": lambda vx, vy, vz: speed(vx, vy, vz) * vy,
-        "|v|vz": lambda vx, vy, vz: speed(vx, vy, vz) * vz,
-    }
-)
 THROWS = ((8, 3, 9), (-6, 7, 6), (5, -8, 10), (-9, -4, 5))
 
 
@@ -81,14 +74,6 @@ def thrown(starts, noise=0.01):
     return [(t, x + noise * x.std(axis=0) * rng.normal(size=x.shape)) for x in paths]
 
 
-def test_four_throws_tell_quadratic_drag():
-    found = vl.discover(thrown(THROWS), order=2, library=Library.polynomial(1) + SEPARATE)
-    wanted = {("|v|vx", 3), ("|v|vy", 4), ("|v|vz", 5), ("1", 5)}
-    support = found.system.support & (np.arange(6) > 2)
-    assert {(found.terms[k], j) for k, j in np.argwhere(support)} == wanted
-    assert found.status == "ok"
-
-
 @pytest.mark.parametrize("start", THROWS[:2])
 def test_one_throw_tells_quadratic_drag_that_is_the_same_in_all_directions(start):
     vector = Library.terms({"v": lambda vx, vy, vz: np.array([vx, vy, vz])})
@@ -100,35 +85,6 @@ def test_one_throw_tells_quadratic_drag_that_is_the_same_in_all_directions(start
     drags, errors = (part[rows, [3, 4, 5]] for part in (found.coefficients, found.standard_errors))
     np.testing.assert_allclose([drags, errors], [drags[:1], errors[:1]] * np.ones(3), rtol=1e-9)
     assert abs(drags[0] + 0.05) < 5 * errors[0] < 0.001
-
-
-def test_directions_of_a_vector_share_their_coefficient_and_no_other_does():
-    library = Library.polynomial(0) + DRAG
-    form = Form.of(("x", "y", "z"), library, 2)
-    l, entries = len(form.exponents), np.arange(6 * len(form.exponents))
-    followers = np.flatnonzero(form.shared != entries)
-    assert [int(entry) // l for entry in followers] == [4, 5]
-    assert {int(entry) // l for entry in form.shared[followers]} == {3}
-    assert len(form.searched) == 3 + 1
-    assert (Form.of(("x", "y", "z"), Library.polynomial(3), 2).shared == np.arange(6 * 84)).all()
-
-
-def test_the_law_of_gravitation_is_found_from_positions():
-    pull = Library.terms({"r/r^3": lambda x, y: np.array([x, y]) / np.hypot(x, y) ** 3})
-    t = np.linspace(0, 20, 1500)
-    law = PolynomialSystem.from_terms(
-        {"x": {"vx": 1}, "y": {"vy": 1}, "vx": {"x/r^3": -1}, "vy": {"y/r^3": -1}},
-        library=Library.terms(
-            {
-                "x/r^3": lambda x, y: x / np.hypot(x, y) ** 3,
-                "y/r^3": lambda x, y: y / np.hypot(x, y) ** 3,
-            }
-        ),
-    )
-    x = law.simulate(t, [1, 0, 0, 1.2])[:, :2]
-    x += 0.01 * x.std(axis=0) * np.random.default_rng(0).normal(size=x.shape)
-    found = vl.discover(t, x, order=2, library=Library.polynomial(1) + pull)
-    assert found.native.text(2) == "x'' = -r/r^3_x\ny'' = -r/r^3_y"
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.003])
@@ -217,16 +173,6 @@ def test_a_fraction_evaluates_differentiates_and_prints(tmp_path):
     found = vl.discover(t, law.simulate(t, [1.0, 0.5]), library=FRACTION)
     found.save(tmp_path / "law")
     assert vl.Discovery.load(tmp_path / "law").equations() == found.equations()
-
-
-def test_a_law_without_a_denominator_is_found_among_fractions():
-    t = np.linspace(0, 20, 1500)
-    law = PolynomialSystem.from_terms({"x": {"y": 1.0}, "y": {"x": -1.0, "y": 1.0, "x^2 y": -1.0}})
-    x = law.simulate(t, [1.0, 0.0])
-    x += 0.01 * x.std(axis=0) * np.random.default_rng(0).normal(size=x.shape)
-    found = vl.discover(t, x, library=FRACTION)
-    assert found.system.support.sum() == 4
-    assert "/ (1" not in found.equations()
 
 
 def test_a_path_ends_at_a_pole():

@@ -153,14 +153,6 @@ def test_error_bars_of_given_errors_cover(kind):
     assert 0.6 < np.std(scores) < 1.5
 
 
-def test_given_errors_are_worth_more_than_none():
-    rng = np.random.default_rng(3)
-    sigma = np.where(rng.random(X.shape) < 0.3, 0.3, 0.01)
-    x = X + sigma * rng.normal(size=X.shape)
-    told, untold = (vl.discover(T, x, degree=2, sigma=s).standard_errors for s in (sigma, None))
-    assert told[1, 1] < 0.5 * untold[1, 1]
-
-
 @pytest.mark.parametrize(("factor", "words"), [(0.4, "times sigma"), (2.5, "sigma of x is")])
 def test_errors_that_contradict_the_data_are_doubted(factor, words):
     found = vl.discover(T, noisy(0.05), degree=2, sigma=factor * 0.05)

@@ -71,17 +71,6 @@ def test_the_order_of_a_forced_law_is_decided():
     assert (both.system.order, both.status) == (1, "ok")
 
 
-def test_the_order_of_several_forced_coordinates_is_decided():
-    springs = solve_ivp(
-        lambda s, x: [x[2], x[3], -x[0] - 0.1 * x[2] + force(s), x[0] - 2 * x[1] - 0.1 * x[3]],
-        (0, 40), (0.5, 0.2, 0.0, 0.3), t_eval=T, rtol=1e-10, atol=1e-12,
-    ).y.T  # fmt: skip
-    found = vl.discover(T, noisy(springs[:, :2], 0.01), library=Library.polynomial(1) + U)
-    assert found.system.order == 2
-    assert terms(found.system, "vx") == {"x", "vx", "u"}
-    assert terms(found.system, "vy") == {"x", "y", "vy"}
-
-
 def test_functions_of_the_time_may_multiply_the_state():
     x = duffing(push=lambda t, x: 0.4 * x * np.cos(1.9 * t))[:, :1]
     library = CUBIC + Library.terms(

@@ -39,12 +39,6 @@ def systems(draw):
     return PolynomialSystem(variable_names(d), exponents, sparse)
 
 
-def test_exponents_are_graded_and_complete():
-    assert monomial_exponents(2, 2).tolist() == [[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]]
-    assert len(monomial_exponents(3, 3)) == 20
-    assert len(np.unique(monomial_exponents(4, 3), axis=0)) == 35
-
-
 def test_terms_are_read_in_any_usual_spelling():
     spellings = ["x^2 y", "x*x*y", "yx**2", " x ^2*y "]
     laws = [PolynomialSystem.from_terms({"x": {s: 2.0}, "y": {}}, degree=3) for s in spellings]
@@ -132,16 +126,6 @@ def test_shift_leaves_no_remainder_where_terms_cancel():
     assert shifted.coefficients[shifted.terms.index("1"), 0] == 0
 
 
-def test_generators_differentiate_monomials_and_shifts():
-    exponents = monomial_exponents(2, 3)
-    x, axis, step = np.array([[0.3, -1.2]]), np.array([0.0, 1e-6]), 1e-6
-    generator = shift_generators(exponents)[1]
-    slope = (monomials(x + axis, exponents) - monomials(x - axis, exponents)) / (2 * step)
-    np.testing.assert_allclose(monomials(x, exponents) @ generator, slope, atol=1e-8)
-    rate = (shift_matrix(exponents, axis) - shift_matrix(exponents, -axis)) / (2 * step)
-    np.testing.assert_allclose(rate, -generator, atol=1e-8)
-
-
 def test_closure_holds_all_divisors():
     assert closure(np.array([[2, 0], [0, 1]])).tolist() == [[0, 0], [1, 0], [0, 1], [2, 0]]
     exponents = monomial_exponents(2, 2)
@@ -194,14 +178,6 @@ def test_degrees_are_whole_numbers(degree):
     if degree is not None:
         with pytest.raises(ValueError, match="degree: must be"):
             PolynomialSystem.from_terms({"x": {"1": 1}}, degree=degree)
-
-
-@pytest.mark.parametrize(
-    ("largest", "power"),
-    [(0.0, 0), (1.5, 0), (9.9e5, 0), (1.5e6, 6), (1.5e-5, 0), (9.9e-6, -6), (2e-300, -300)],
-)
-def test_numbers_of_many_digits_are_printed_with_a_power_of_ten(largest, power):
-    assert with_error(np.array(largest), 0.0)[1] == power
 
 
 # -------------------------------------------------------------------------------------------- paths

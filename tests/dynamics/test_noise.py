@@ -32,11 +32,6 @@ def test_autoregressive_errors_are_inflated_as_theory_says(correlation):
     assert inflation([error[:, None]])[0] == pytest.approx(expected, rel=0.1)
 
 
-def test_errors_that_alternate_are_not_inflated():
-    error = lasting(3000, -0.8, np.random.default_rng(3))
-    assert inflation([error[:, None]])[0] == 1.0
-
-
 def test_nothing_lasts_from_one_stretch_into_the_next():
     rng = np.random.default_rng(4)
     # Each stretch has its own level: within it errors never end, between two they are unrelated.

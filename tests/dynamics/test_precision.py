@@ -65,12 +65,6 @@ def test_gross_errors_do_no_harm():
     assert (found.noise < 1.3 * clean.noise).all()
 
 
-def test_what_lasts_is_no_noise():
-    smooth = np.sin(TIMES) * np.where(TIMES > 28, 1.0, 0.05)
-    factors = weighing._factors(smooth, [PATH[:, 0] ** 2, LAW(PATH)[:, 0] ** 2])
-    np.testing.assert_array_equal(factors, 1.0)
-
-
 def test_where_too_much_is_wrong_nothing_is_left_out():
     rng = np.random.default_rng(9)
     residual = rng.standard_normal(1000)

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics import path
-from vidsindy_lite.study import FLOWS, ODEBENCH, RIVALS, SYSTEMS, scoreboard
+from vidsindy_lite.study import ODEBENCH, RIVALS, SYSTEMS, scoreboard
 from vidsindy_lite.study.scoreboard import (
     ERRORS,
     MOTIONS,
@@ -69,24 +68,11 @@ def test_where_the_origin_is_known_no_other_is_sought():
 
 @pytest.mark.parametrize("error", [*ERRORS, *MOTIONS])
 def test_flows_are_seen_from_one_origin_whatever_the_error(error):
-    contest = FlowContest("Lorenz", error, samples=300)
-    data = contest.data()
-    clean = SYSTEMS["Lorenz"].trajectory(300)[1]
-    shift = (data.x - clean).mean(axis=0)
+    data = FlowContest("Lorenz", error, samples=300).data()
     origin = FlowContest("Lorenz", "drift 0.2 %", samples=300).data().truth
     np.testing.assert_array_equal(data.truth.coefficients, origin.coefficients)
-    start = data.truth(clean[0] + np.round(shift, 1))
-    assert np.isfinite(start).all()
-    assert (data.x - clean - shift).any()
-
-
-def test_flows_have_the_period_that_is_written_down():
-    for name, flow in FLOWS.items():
-        if name not in SYSTEMS:
-            _, x = flow.trajectory(3000)
-            rates = flow(x) / x.std(axis=0)
-            period = 2 * np.pi / np.sqrt((rates**2).mean(axis=0).mean())
-            assert 0.5 < flow.period / period < 2, name
+    off = data.x - SYSTEMS["Lorenz"].trajectory(300)[1]
+    assert (off - off.mean(axis=0)).any()
 
 
 def test_outcomes_are_counted(monkeypatch):
@@ -176,13 +162,6 @@ def test_the_table_of_the_ablation_counts_what_is_lost_and_gained():
     assert table.loc["path"].tolist() == [2, 1, 1, 1, 1, 4.0]
 
 
-@pytest.mark.slow
-def test_without_the_first_law_at_a_large_error_a_law_is_found_all_the_same():
-    _, outcome = run_ablation(Ablation(LorenzContest(10.0, 0.05), "first tolerance"))
-    assert path.TOLERATED > 0
-    assert outcome.exact
-
-
 # ------------------------------------------------------------------------------ what others print
 
 
@@ -228,8 +207,3 @@ def allee(x):
 )
 def test_equations_are_what_the_textbooks_print(number, start, rate):
     np.testing.assert_allclose(ODEBENCH[number].rate(np.array(start)), rate(*start))
-
-
-def test_a_solution_that_is_known():
-    path = ODEBENCH[2].law.simulate(TIMES, (4.78,))[:, 0]
-    np.testing.assert_allclose(path, 4.78 * np.exp(0.23 * TIMES), rtol=1e-9)
