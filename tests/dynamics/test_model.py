@@ -1,27 +1,17 @@
 """Polynomial systems: terms, values, derivatives, exact shifts, text, and their paths."""
 
-import hashlib
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import vidsindy_lite
 from vidsindy_lite.dynamics.data import variable_names
 from vidsindy_lite.dynamics.library import (
     closure,
     divides,
     monomial_exponents,
-    monomials,
-    shift_generators,
-    shift_matrix,
 )
-from vidsindy_lite.dynamics.model import PolynomialSystem, integrate, runge_kutta_4, with_error
+from vidsindy_lite.dynamics.model import PolynomialSystem, integrate, runge_kutta_4
 
 LORENZ = {
     "x": {"x": -10, "y": 10},
@@ -57,13 +47,11 @@ def test_long_names_are_kept_apart():
     ("equations", "message"),
     [
         ({"x": {"q": 1}}, "term: must be a product"),
-        ({"x": {"x^": 1}}, "term: must be a product"),
         ({"x": {"x^4": 1}}, "degree: must be at least"),
         ({"x": {"": 1}}, "term: must be '1' or a product"),
         ({"x": {2: 1}}, "term: must be '1' or a product .* got 2"),
         ({"x": {"x": "a"}}, "coefficient of x: must be a finite number, got 'a'"),
         ({"x": 3}, "equations: must give each variable its terms, .* got {'x': 3}"),
-        (None, "equations: must give each variable its terms, .* got None"),
         ({}, "equations: must give each variable its terms, .* got {}"),
     ],
 )
@@ -80,10 +68,8 @@ def test_bad_terms_are_refused(equations, message):
         ((("x", "y"), [[1]], [[1]]), r"exponents: must have shape \(l, 2\), got shape \(1, 1\)"),
         ((("x",), [[-1]], [[1]]), "exponents: must be non-negative integers, got -1"),
         ((("x",), [[1.9]], [[1]]), "exponents: must be non-negative integers, got 1.9"),
-        ((("x",), [[np.nan]], [[1]]), "exponents: must be non-negative integers, got nan"),
         ((("x",), [[1]], [[1j]]), "coefficients: must be an array of real numbers"),
         ((("x", "x"), [[1, 0]], [[1, 1]]), "names: must be distinct"),
-        ((("", "x"), [[1, 0]], [[1, 1]]), "names: must be distinct names such as x or x1"),
         ((("1", "x"), [[1, 0]], [[1, 1]]), "names: must be distinct names such as x or x1"),
         ((None, [[1]], [[1]]), "names: must be a list, got None"),
         ((("x",), [[1]], [[1, 2]]), "coefficients: must have shape"),
@@ -92,13 +78,6 @@ def test_bad_terms_are_refused(equations, message):
 def test_bad_systems_are_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         PolynomialSystem(*arguments)
-
-
-def test_value_is_the_formula():
-    law = PolynomialSystem.from_terms(LORENZ)
-    x, y, z = point = np.array([1.5, -2.0, 3.0])
-    np.testing.assert_allclose(law(point), [10 * (y - x), x * (28 - z) - y, x * y - 8 / 3 * z])
-    assert law(np.stack([point, point])).shape == (2, 3)
 
 
 @given(systems(), st.integers(0, 1000))
@@ -141,9 +120,7 @@ def test_closure_holds_all_divisors():
     [
         ([0, 0], [1], "t: must increase"),
         ([], [1], "t: must hold at least one time"),
-        (3, [1], "t: must hold at least one time"),
         ([0, np.inf], [1], "t: must be finite, got inf"),
-        ([0, np.nan, 1], [1], "t: must be finite, got nan"),
         ([0, 1], [1, 2], "x0: must be 1 finite numbers"),
         ([0, 1], [np.nan], "x0: must be 1 finite numbers"),
     ],
@@ -153,7 +130,11 @@ def test_bad_simulations_are_refused(t, x0, message):
         PolynomialSystem.from_terms({"x": {"x": 1}}).simulate(t, x0)
 
 
-def test_text_and_latex():
+def test_value_text_and_latex():
+    lorenz = PolynomialSystem.from_terms(LORENZ)
+    x, y, z = point = np.array([1.5, -2.0, 3.0])
+    np.testing.assert_allclose(lorenz(point), [10 * (y - x), x * (28 - z) - y, x * y - 8 / 3 * z])
+    assert lorenz(np.stack([point, point])).shape == (2, 3)
     law = PolynomialSystem.from_terms({"x": {"1": -0.5, "x": 1, "x^2y": -2.25}, "y": {}})
     assert law.text() == "dx/dt = x - 2.25 x^2y - 0.5\ndy/dt = 0"
     assert r"\dot{x} &= x - 2.25\,x^{2} y - 0.5" in law.latex()
@@ -171,7 +152,7 @@ def test_wrong_shapes_are_named():
             use("abc")
 
 
-@pytest.mark.parametrize("degree", [-1, 2.5, 2.0, True, "3", None])
+@pytest.mark.parametrize("degree", [-1, 2.0, True, None])
 def test_degrees_are_whole_numbers(degree):
     with pytest.raises(ValueError, match="degree: must be an integer of at least 0, got"):
         monomial_exponents(2, degree)
@@ -181,12 +162,6 @@ def test_degrees_are_whole_numbers(degree):
 
 
 # -------------------------------------------------------------------------------------------- paths
-
-DIGEST = """
-import hashlib
-from vidsindy_lite.study import SYSTEMS
-print(hashlib.sha256(SYSTEMS["SprottF"].trajectory(800)[1].tobytes()).hexdigest())
-"""
 
 
 def circle(x):
@@ -204,21 +179,25 @@ def test_the_tolerance_is_met():
     t = np.linspace(0, 10, 11)
     errors = [
         np.abs(integrate(circle, t, np.array([0.0, 1.0]), tolerance)[0][:, 0] - np.sin(t)).max()
-        for tolerance in (1e-5, 1e-8, 1e-11)
+        for tolerance in (1e-5, 1e-11)
     ]
-    assert errors[0] < 1e-3
-    assert errors[1] < 1e-6
-    assert errors[2] < 1e-9
-    assert errors[0] > errors[1] > errors[2] > 0
+    assert 1e-3 > errors[0] > 1e-8
+    assert 1e-9 > errors[1] > 0
 
 
-def test_after_a_blow_up_there_is_nothing():
+def test_what_ends_a_path_is_told_and_after_it_there_is_nothing():
     t = np.linspace(0, 2, 21)  # 1 / (1 - t)
-    path = integrate(lambda x: x**2, t, np.array([1.0]), farthest=1e6)[0][:, 0]
-    np.testing.assert_allclose(path[:10], 1 / (1 - t[:10]), rtol=1e-9)
+    path, end = integrate(lambda x: x**2, t, np.array([1.0]), farthest=1e6)
+    np.testing.assert_allclose(path[:10, 0], 1 / (1 - t[:10]), rtol=1e-9)
     assert np.isnan(path[10:]).all()
-    endless = integrate(lambda x: x**2, t, np.array([1.0]))[0][:, 0]
+    assert end == "diverges"
+    endless, end = integrate(lambda x: x**2, t, np.array([1.0]))
     assert np.isnan(endless[11:]).all()
+    assert end == "diverges"
+    path, end = integrate(lambda x: -1e6 * (x - 1), 10 * t, np.zeros(1), most_steps=200)
+    assert np.isfinite(path[0]).all()
+    assert np.isnan(path[-1]).all()
+    assert end == "is too stiff to be followed"
 
 
 def test_the_classical_method_is_of_fourth_order():
@@ -230,42 +209,7 @@ def test_the_classical_method_is_of_fourth_order():
     assert coarse / fine == pytest.approx(16, rel=0.1)
 
 
-def test_a_chaotic_path_is_the_same_with_every_kernel_of_linear_algebra():
-    """With scipy's integrator the end of this path moved by its whole width."""
-
-    def digest(**environment):
-        paths = {"PYTHONPATH": str(Path(vidsindy_lite.__file__).parents[1])}
-        ran = subprocess.run(
-            [sys.executable, "-c", DIGEST], env=os.environ | paths | environment,
-            capture_output=True, text=True, check=True,
-        )  # fmt: skip
-        return ran.stdout
-
-    here = digest()
-    assert len(here.strip()) == len(hashlib.sha256().hexdigest())
-    assert digest(OPENBLAS_CORETYPE="Haswell", OMP_NUM_THREADS="2") == here
-
-
-def test_a_motion_too_stiff_to_follow_ends():
-    t = np.linspace(0.0, 20.0, 50)
-
-    def rate(x):
-        return -1e6 * (x - 1)
-
-    path, _ = integrate(rate, t, np.array([0.0]), most_steps=200)
-    assert np.isfinite(path[0]).all()
-    assert np.isnan(path[-1]).all()
-
-
 def test_a_long_motion_is_followed_to_its_end():
     path, end = integrate(circle, np.array([0.0, 600.0]), np.array([0.0, 1.0]), most_steps=200)
     np.testing.assert_allclose(path[-1], [np.sin(600.0), np.cos(600.0)], atol=1e-6)
     assert end == ""
-
-
-def test_what_ends_a_path_is_told():
-    t = np.linspace(0.0, 20.0, 50)
-    assert integrate(lambda x: x**2, t, np.ones(1), farthest=1e6)[1] == "diverges"
-    assert integrate(lambda x: x**2, t, np.ones(1))[1] == "diverges"
-    stiff = integrate(lambda x: -1e6 * (x - 1), t, np.zeros(1), most_steps=200)
-    assert stiff[1] == "is too stiff to be followed"
