@@ -14,8 +14,6 @@ from vidsindy_lite.dynamics.bspline import (
     _roughness,
     clamped_knots,
     design_matrix,
-    normal_band,
-    rows_from,
     smooth,
     solve_factored,
 )
@@ -39,35 +37,6 @@ def test_agrees_with_scipy(count, order, seed):
 def test_bad_breakpoints_are_refused(breakpoints):
     with pytest.raises(ValueError, match="breakpoints: must be at least two increasing"):
         clamped_knots(breakpoints)
-
-
-def pieces():
-    rng = np.random.default_rng(0)
-    times = [np.sort(rng.uniform(low, high, 9)) for low, high in [(0.0, 2.0), (3.0, 4.5)]]
-    return [Segment.even(t, rng.normal(size=(9, 2)), 0.4, i) for i, t in enumerate(times)]
-
-
-@pytest.mark.parametrize("spacing", [0.3, 0.25, 5.0])
-def test_even_knots_are_as_far_apart_as_asked_for_or_closer(spacing):
-    t = np.array([2.0, 2.1, 3.0])
-    breakpoints = Segment.even(t, t[:, None], spacing, 0).breakpoints
-    gaps = np.diff(breakpoints)
-    assert breakpoints[[0, -1]].tolist() == [2.0, 3.0]
-    np.testing.assert_allclose(gaps, gaps[0])
-    assert gaps[0] <= spacing + 1e-12
-    assert 1 / (len(gaps) - 1) > spacing if len(gaps) > 1 else spacing >= 1
-
-
-def test_nodes_are_midpoints_and_ends():
-    segments = pieces()
-    grid = Grid.of(segments)
-    assert grid.nodes.shape[0] == grid.r - len(segments)
-    first = segments[0].breakpoints
-    nodes = np.concatenate([first[:1], (first[1:] + first[:-1]) / 2, first[-1:]])
-    k, r = len(nodes), len(first) + 2
-    knots = grid.knots[0]
-    np.testing.assert_allclose(grid.nodes.toarray()[:k, :r], design_matrix(knots, nodes))
-    np.testing.assert_allclose(grid.slopes.toarray()[:k, :r], design_matrix(knots, nodes, order=1))
 
 
 def test_at_a_kink_the_curve_is_continuous_and_its_slope_is_not():
@@ -100,8 +69,8 @@ def test_node_weights_are_the_lengths_that_nodes_stand_for():
 BLOCK = 48  # rows that are solved at once
 
 
-@pytest.mark.parametrize("n", [1, 7, BLOCK, 2 * BLOCK + 1, 3 * BLOCK - 1])
-@pytest.mark.parametrize("reach", [3, 11, BLOCK + 5])
+@pytest.mark.parametrize("n", [1, BLOCK, 3 * BLOCK - 1])
+@pytest.mark.parametrize("reach", [3, BLOCK + 5])
 def test_many_right_hand_sides_are_solved_for(n, reach):
     rng = np.random.default_rng(n)
     rows = np.tril(rng.normal(size=(n, n))) + 2 * reach * np.eye(n)
@@ -118,26 +87,13 @@ def test_many_right_hand_sides_are_solved_for(n, reach):
 # ---------------------------------------------------------------------------------------- smoothing
 
 
-def wave(n):
-    t = np.linspace(0, 20, n)
-    return t, np.stack([np.sin(t), np.cos(1.7 * t) + 0.3 * t], axis=1)
-
-
-@pytest.mark.parametrize("sigma", [1e-3, 1e-2, 0.1, 0.5])
+@pytest.mark.parametrize("sigma", [1e-3, 0.5])
 def test_noise_is_estimated_over_three_decades(sigma):
-    t, x = wave(800)
+    t = np.linspace(0, 20, 800)
+    x = np.stack([np.sin(t), np.cos(1.7 * t) + 0.3 * t], axis=1)
     noisy = x + sigma * np.random.default_rng(3).normal(size=x.shape)
     estimate = smooth([(t, noisy)], np.random.default_rng(0)).noise
     np.testing.assert_allclose(estimate, sigma, rtol=0.1)
-
-
-def test_nothing_is_smoothed_across_a_gap():
-    t = np.linspace(0, 1, 101)
-    step = np.where(t < 0.5, 0.0, 1.0)[:, None]
-    halves = [(t[:50], step[:50]), (t[51:], step[51:])]
-    left, right = smooth(halves, np.random.default_rng(0)).splines
-    np.testing.assert_allclose(left(t[:50]), 0, atol=1e-8)
-    np.testing.assert_allclose(right(t[51:]), 1, atol=1e-8)
 
 
 def dense(band):

@@ -28,26 +28,17 @@ def uneven(kind, rng):
     return PATH + size * rng.standard_normal(PATH.shape), size
 
 
-@pytest.fixture(params=["growing", "for a while", "faster"])
-def measured(request):
-    return uneven(request.param, np.random.default_rng(2))
-
-
-def test_law_is_exact_and_its_errors_are_right(measured):
-    x, _ = measured
+@pytest.mark.parametrize("kind", ["growing", "for a while", "faster"])
+def test_law_is_exact_and_its_errors_are_right_and_smaller_than_by_one_variance(kind, monkeypatch):
+    x, _ = uneven(kind, np.random.default_rng(2))
     found = vl.discover(TIMES, x)
     assert (found.system.support == LAW.support).all()
     assert found.status == "ok"
     kept = LAW.support
-    off = (found.coefficients - LAW.coefficients)[kept] / found.standard_errors[kept]
-    assert (np.abs(off) < 4).all()
-
-
-def test_error_bars_are_smaller_than_by_one_variance(measured, monkeypatch):
-    x, _ = measured
-    weighed = vl.discover(TIMES, x).standard_errors[LAW.support]
+    weighed = found.standard_errors[kept]
+    assert (np.abs((found.coefficients - LAW.coefficients)[kept] / weighed) < 4).all()
     monkeypatch.setattr(weighing, "LIKELY", np.inf)
-    even = vl.discover(TIMES, x).standard_errors[LAW.support]
+    even = vl.discover(TIMES, x).standard_errors[kept]
     assert np.exp(np.log(even / weighed).mean()) > 1.1
 
 
@@ -100,7 +91,7 @@ def test_noise_that_looks_even_before_a_law_is_known_stays_even():
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("share", [0.05, 0.6, 1.0])
+@pytest.mark.parametrize("share", [0.05, 1.0])
 def test_residuals_that_are_exactly_zero_are_no_accident(share):
     residual = 0.01 * np.random.default_rng(3).standard_normal(800)
     residual[: int(800 * share) - 1] = 0.0
@@ -112,7 +103,7 @@ def test_residuals_that_are_exactly_zero_are_no_accident(share):
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("n", [2, 5, 9, 28])
+@pytest.mark.parametrize("n", [2, 9])
 def test_fewer_errors_than_stretches_have_precisions_too(n):
     residual = np.random.default_rng(n).standard_normal(n)
     precision = weighing._factors(residual, [np.linspace(1, 2, n)])
@@ -120,15 +111,15 @@ def test_fewer_errors_than_stretches_have_precisions_too(n):
     assert (np.isfinite(precision) & (precision >= 0)).all()
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-4, 1e-2])
 @pytest.mark.parametrize(
-    ("slopes", "start"),
+    ("slopes", "start", "noise"),
     [
-        ({"x": {"x": -20.0}}, [1.0]),
-        ({"x": {"1": 8.0, "x": -16.0}}, [3.0]),
-        ({"x": {"x": -25.0, "y": 1.0}, "y": {"y": -0.5}}, [1.0, 1.0]),
+        ({"x": {"x": -20.0}}, [1.0], 0.0),
+        ({"x": {"1": 8.0, "x": -16.0}}, [3.0], 1e-2),
+        ({"x": {"1": 8.0, "x": -16.0}}, [3.0], 1e-6),
+        ({"x": {"x": -25.0, "y": 1.0}, "y": {"y": -0.5}}, [1.0, 1.0], 1e-4),
     ],
-    ids=["a decay", "mixing", "a stiff start"],
+    ids=["a decay", "mixing and noise", "mixing", "a stiff start"],
 )
 def test_a_transient_of_few_samples_is_the_laws_and_no_error(slopes, start, noise):
     law, t = PolynomialSystem.from_terms(slopes), np.linspace(0, 5, 100)

@@ -1,8 +1,6 @@
 """The result: units, error bars, frames, texts, files, and a picture of its path."""
 
 import json
-import subprocess
-import sys
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -10,8 +8,6 @@ import pytest
 
 import vidsindy_lite as vl
 from vidsindy_lite import Library
-from vidsindy_lite.dynamics.data import Units
-from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.model import PolynomialSystem
 from vidsindy_lite.dynamics.result import Discovery, _with_error
 from vidsindy_lite.dynamics.solver import discover
@@ -28,18 +24,6 @@ def found():
     return discover(t, x, degree=2)
 
 
-def test_units_turn_a_law_back():
-    """A law in standard units, rescaled, is the law of the rescaled trajectory."""
-    rng = np.random.default_rng(0)
-    exponents = monomial_exponents(2, 3)
-    coefficients = rng.normal(size=(10, 2))
-    units = Units(np.zeros(2), np.array([3.0, 0.2]), 7.0)
-    law = PolynomialSystem(("x", "y"), exponents, coefficients * units.factors(exponents))
-    standard = PolynomialSystem(("x", "y"), exponents, coefficients)
-    z = rng.normal(size=2)
-    np.testing.assert_allclose(law(units.point(z)), standard(z) * units.scale / units.time)
-
-
 def test_equations_show_errors_in_both_frames(found):
     assert "±" in found.equations()
     assert found.equations("data") != found.equations("native")
@@ -48,13 +32,10 @@ def test_equations_show_errors_in_both_frames(found):
         found.equations("reference")
 
 
-def test_errors_are_zero_exactly_where_there_is_no_term(found):
+def test_errors_are_zero_where_there_is_no_term_and_carried_along_with_a_shift(found):
     assert ((found.standard_errors > 0) == found.system.support).all()
     assert ((found.native_standard_errors > 0) == found.native.support).all()
-
-
-def test_covariance_of_the_shift_is_carried_along(found):
-    """The constant in the frame of the data is minus the slope times the offset."""
+    # The constant in the frame of the data is minus the slope times the offset.
     x, one = found.terms.index("x"), found.terms.index("1")
     ratio = found.coefficients[one, 1] / found.coefficients[x, 1]
     assert ratio == pytest.approx(-found.offset[0], rel=1e-9)
@@ -86,13 +67,9 @@ def test_a_law_predicts_slopes_and_paths(spring):
     np.testing.assert_allclose(ahead.x, law.simulate(t, (0.5, 0.5)) + (2, 0), atol=1e-5)
     assert ahead.status == "ok"
     np.testing.assert_array_equal(ahead.t, t)
-
-
-def test_a_path_that_diverges_is_told():
-    law = PolynomialSystem.from_terms({"x": {"x^2": 1}})
     t = np.linspace(0, 0.9, 100)
-    found = discover(t, law.simulate(t, [1.0]), degree=2)  # 1 / (1 - t)
-    ahead = found.simulate([1.0], np.linspace(0, 2, 21))
+    grown = PolynomialSystem.from_terms({"x": {"x^2": 1}}).simulate(t, [1.0])  # 1 / (1 - t)
+    ahead = discover(t, grown, degree=2).simulate([1.0], np.linspace(0, 2, 21))
     assert ahead.status in {"diverges after t = 0.9", "diverges after t = 1"}
     assert np.isfinite(ahead.x[:10]).all()
     assert np.isnan(ahead.x[11:]).all()
@@ -115,23 +92,10 @@ def test_a_discovery_is_saved_and_loaded_digit_for_digit(spring, tmp_path):
     assert (tmp_path / "copy.json").read_bytes() == (tmp_path / "law.json").read_bytes()
 
 
-@pytest.mark.parametrize(
-    "text", ["", "[]", "{}", '{"format": "another", "discovery": {}}', "not JSON"]
-)
-def test_a_file_that_holds_no_discovery_is_refused(tmp_path, text):
-    file = tmp_path / "law.json"
-    file.write_text(text)
-    with pytest.raises(ValueError, match="path: must be a (JSON )?file.*, got '"):
-        Discovery.load(file)
-
-
-def test_a_missing_file_is_told_with_the_argument(tmp_path):
+def test_a_file_that_cannot_be_read_or_written_is_told_with_the_argument(spring, tmp_path):
     for path in (tmp_path / "law.json", tmp_path):
         with pytest.raises(FileNotFoundError, match="path: no such file of a discovery, got '"):
             Discovery.load(path)
-
-
-def test_a_file_that_cannot_be_written_is_told_with_the_argument(spring, tmp_path):
     for path in (tmp_path, tmp_path / "none" / "law.json"):
         with pytest.raises(ValueError, match="path: must be a file in a folder that exists, got"):
             spring[2].save(path)
@@ -150,7 +114,7 @@ def test_a_curve_forgives_the_rounding_of_its_ends_in_proportion_to_its_length(f
     [
         ((28.076, 0.043), "+ (28.076 ± 0.043) x"),
         ((-3.2e-7, 1.1e-9), "- (3.200 ± 0.011)e-7 x"),
-        ((9991755739716659200.0, 16163795182168822.0), "+ (9.992 ± 0.016)e18 x"),
+        ((9.9917557e18, 1.6163795e16), "+ (9.992 ± 0.016)e18 x"),
         ((28.0, 0.0), "+ 28 x"),  # known
         ((-1e7, 0.0), "- 1e7 x"),
     ],
@@ -221,8 +185,3 @@ def test_every_plateau_is_drawn_and_the_law_is_marked_where_it_holds(found):
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.texts] == ["all laws", "the law"]
     plt.close(figure)
-
-
-def test_matplotlib_waits_until_something_is_drawn():
-    code = "import sys, vidsindy_lite.dynamics; assert 'matplotlib' not in sys.modules"
-    subprocess.run([sys.executable, "-c", code], check=True)

@@ -30,16 +30,13 @@ def test_a_pendulum_gives_its_length_and_angle():
 def test_the_errors_cover_in_space():
     rng = np.random.default_rng(0)
     truth, covered = np.array([1.2, 1, 2, 3]), []
-    for _ in range(200):
+    for _ in range(100):
         circle = vl.on_circle(bob(SWING) + 0.005 * rng.standard_normal((400, 3)))
         found = np.append(circle.radius, circle.centre)
         errors = np.append(circle.radius_error, circle.centre_errors)
         covered.append(np.abs(found - truth) < 1.96 * errors)
-    assert ((np.mean(covered, axis=0) > 0.89) & (np.mean(covered, axis=0) < 0.99)).all()
-
-
-def test_errors_that_last_count_for_more():
-    white = np.random.default_rng(1).standard_normal((400, 3))
+    assert ((np.mean(covered, axis=0) > 0.87) & (np.mean(covered, axis=0) < 1)).all()
+    white = rng.standard_normal((400, 3))
     lasting = np.apply_along_axis(np.convolve, 0, white, np.ones(9) / 3, "same")
     one, nine = (vl.on_circle(bob(SWING) + 0.005 * e) for e in (white, lasting))
     assert nine.radius_error > 1.7 * one.radius_error
@@ -67,16 +64,11 @@ def test_a_sphere_has_two_angles():
     assert (np.abs(ball.centre - [5, 0, 0]) < 4 * ball.centre_errors).all()
     # The angles say where it is, whatever direction they are counted in.
     longitude, latitude = ball.angle.T
-    place = np.stack(
-        [
-            np.cos(latitude) * np.cos(longitude),
-            np.cos(latitude) * np.sin(longitude),
-            np.sin(latitude),
-        ]
+    c, place = np.cos(latitude), [np.cos(longitude), np.sin(longitude), np.sin(latitude)]
+    back = (
+        ball.centre + ball.radius * np.stack([c * place[0], c * place[1], place[2]], 1) @ ball.axes
     )
-    assert ball.centre + ball.radius * (place.T @ ball.axes) == pytest.approx(
-        noisy + [5, 0, 0], abs=0.02
-    )
+    assert back == pytest.approx(noisy + [5, 0, 0], abs=0.02)
 
 
 @pytest.mark.parametrize(
@@ -92,6 +84,9 @@ def test_a_sphere_has_two_angles():
 def test_what_is_not_round_is_refused(fit, x, rule):
     with pytest.raises(ValueError, match=rule):
         fit(x)
+    for zero in ((0, 1), (0.8, -0.6, 0), (0, 0, np.nan)):  # the second is not in its plane
+        with pytest.raises(ValueError, match="zero: must be"):
+            vl.on_circle(bob(SWING), zero=zero)
 
 
 def test_errors_that_all_positions_share_are_passed_on():
@@ -109,20 +104,14 @@ def test_errors_that_all_positions_share_are_passed_on():
     assert np.abs(circle.systematic[1, seen]) == pytest.approx(0.002, rel=1e-4)
     with pytest.raises(ValueError, match=r"systematic: must be finite, of shape \(k, 400, 3\)"):
         vl.on_circle(x, systematic=causes[:, :9])
-    ball = vl.on_sphere(bob(np.stack([SWING, SWING])[0]) + np.sin(TIMES)[:, None] * [-0.8, 0.6, 0])
-    assert ball.systematic is None
 
 
-def test_what_hardly_bends_is_said_to_be_on_no_circle():
+def test_what_is_on_no_circle_is_said_in_short():
     rng, t = np.random.default_rng(0), np.linspace(0, 30, 400)
     wave = np.column_stack([t, np.sin(t)])
     assert "hardly bends" in vl.on_circle(wave).warnings[-1]
     arc = np.column_stack([np.sin(0.5 * np.sin(t)), np.cos(0.5 * np.sin(t))])
     assert vl.on_circle(arc + 0.01 * rng.standard_normal((400, 2))).warnings == ()
-
-
-def test_what_is_on_no_circle_is_said_in_short():
-    rng = np.random.default_rng(0)
     fine = vl.on_circle(bob(SWING) + 0.01 * rng.standard_normal((400, 3)))
     assert fine.warnings == ()
     assert repr(fine).startswith("circle of radius 1.2")
@@ -131,9 +120,3 @@ def test_what_is_on_no_circle_is_said_in_short():
     for x in (ellipse, rng.standard_normal((200, 3))):
         assert "may be on no circle" in str(vl.on_circle(x))
     assert "may be on no sphere" in str(vl.on_sphere(rng.standard_normal((200, 3))))
-
-
-@pytest.mark.parametrize("zero", [(0, 1), (0.8, -0.6, 0), (0, 0, np.nan)])
-def test_a_zero_that_is_no_direction_is_refused(zero):
-    with pytest.raises(ValueError, match="zero: must be"):
-        vl.on_circle(bob(SWING), zero=zero)

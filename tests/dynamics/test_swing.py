@@ -42,9 +42,7 @@ def test_a_bob_in_space_has_the_law_of_its_angle(swung):
     assert abs(swing.g.value - G) < 4 * swing.g.error < 0.1
     # The angle is counted from where the bob would rest.
     assert swing.circle.axes[0] @ DOWN > np.cos(0.01)
-
-
-def test_the_law_of_positions_stays_doubted(swung):
+    # The law of positions stays doubted.
     assert swung.status == "suspect"
     assert any("stays on a circle" in text for text in swung.warnings)
 
@@ -60,14 +58,6 @@ def test_the_swing_is_printed_and_kept(swung, tmp_path):
     assert str(kept) == str(swung.swing)
     np.testing.assert_array_equal(kept.circle.angle, swung.swing.circle.angle)
     np.testing.assert_allclose(kept.law.predict([0.5, 0.1]), swung.swing.law.predict([0.5, 0.1]))
-
-
-def test_a_plane_that_is_one_of_the_axes():
-    x = bob(1.2, 0.003)
-    x = np.stack([x @ RIGHT, (x - x.mean(axis=0)) @ np.cross(RIGHT, DOWN), x @ DOWN], axis=1)
-    swing = vl.discover(TIMES, x, degree=2).swing
-    assert right_terms(swing.law)
-    assert abs(swing.g.value - G) < 4 * swing.g.error
 
 
 def test_coordinates_that_are_never_seen_together_are_on_no_circle():
@@ -106,14 +96,16 @@ def flat(x):
 
 
 def test_in_the_plane_too_and_from_two_runs():
-    swing = swing_of([(TIMES, flat(bob(1.2, 0.003))), (TIMES, flat(bob(0.7, 0.003, 1)))])
+    runs = [(TIMES, flat(bob(1.2, 0.003))), (TIMES, flat(bob(0.7, 0.003, 1)))]
+    runs[0][1][150:160], runs[1][1][250, 1] = np.nan, np.nan  # rows that were not seen
+    swing = swing_of(runs)
     assert right_terms(swing.law)
     assert abs(swing.g.value - G) < 4 * swing.g.error
 
 
 def test_error_bars_count_in_those_of_the_circle():
     off = []
-    for seed in range(8):
+    for seed in range(5):
         law = swing_of([(TIMES, flat(bob(0.8, 0.006, seed)))]).law
         row = law.terms.index("sin(angle)")
         off.append((law.coefficients[row, 1] + G / LENGTH) / law.standard_errors[row, 1])
@@ -127,12 +119,6 @@ def test_errors_that_all_positions_share_widen_those_of_g():
     assert right_terms(shared.law)
     assert shared.g.error > 5 * alone.g.error
     assert shared.g.error == pytest.approx(0.01 * G, rel=0.2)
-
-
-def test_rows_that_were_not_seen_do_not_count():
-    x = flat(bob(1.5, 0.002))
-    x[150:160], x[250, 1] = np.nan, np.nan
-    assert right_terms(swing_of([(TIMES, x)]).law)
 
 
 def test_where_nothing_rests_the_angle_counts_from_the_middle():
@@ -152,7 +138,7 @@ def test_no_swing_where_none_is_asked_for_or_none_is_there(swung):
     assert swung.swing.law.swing is None
 
 
-@pytest.mark.parametrize(("speed", "turns"), [(8.0, 2), (12.0, 12), (15.0, 17)])
+@pytest.mark.parametrize(("speed", "turns"), [(8.0, 2), (15.0, 17)])
 def test_a_bob_that_goes_over_the_top_and_on(speed, turns):
     angle = PENDULUM.simulate(TIMES, np.array([0.5, speed]))[:, 0]
     assert np.ptp(angle) > turns * 2 * np.pi

@@ -17,11 +17,8 @@ def distorted(name, seed, size):
     return truth, t, x + np.tensordot(rng.normal(size=4), modes, 1) + noise, modes
 
 
-@pytest.mark.parametrize(
-    ("name", "seed"), [("SprottE", 0), pytest.param("WangSun", 4, marks=pytest.mark.slow)]
-)
-def test_a_slightly_wrong_map_costs_accuracy_unless_it_is_told(name, seed):
-    truth, t, x, modes = distorted(name, seed, 1e-4)
+def test_a_slightly_wrong_map_costs_accuracy_unless_it_is_told():
+    truth, t, x, modes = distorted("SprottE", 0, 1e-4)
     blind = study.score(vl.discover(t, x), truth)
     told = vl.discover(t, x, systematic=modes)
     assert blind.exact
@@ -31,6 +28,10 @@ def test_a_slightly_wrong_map_costs_accuracy_unless_it_is_told(name, seed):
     pulls = (told.coefficients - truth.coefficients)[inside] / told.standard_errors[inside]
     assert np.sqrt(np.mean(pulls**2)) < 2.5
     assert told.status == "ok"
+    x[100:104], modes[:, 100:104] = np.nan, np.nan
+    halves = [(t[:150], x[:150]), (t[150:], x[150:])]
+    parts = vl.discover(halves, systematic=[modes[:, :150], modes[:, 150:]])
+    assert study.score(parts, truth).exact
 
 
 def oscillation():
@@ -47,20 +48,10 @@ def test_no_systematic_errors_change_nothing():
     np.testing.assert_array_equal(plain.covariance, none.covariance)
 
 
-def test_error_bars_grow_with_systematic_errors():
-    # A wrong scale of x alone changes both coefficients in proportion.
-    t, x, noisy = oscillation()
-    scale = 1e-3 * x * [1, 0]
-    without, told = (vl.discover(t, noisy, 1, systematic=e) for e in (None, scale[None]))
-    np.testing.assert_allclose(told.standard_errors.max(axis=0), 1e-3, rtol=0.1)
-    assert without.standard_errors.max() < 2e-4
-
-
-@pytest.mark.parametrize("error", [1e-3, 3e-2])
-def test_an_error_of_scale_changes_error_bars_alone(error):
+def test_an_error_of_scale_changes_error_bars_alone():
     """It is a share of the noise, too: as a change of the path it would explain that noise."""
-    law = study.SYSTEMS["RayleighBenard"]
-    t, x = law.trajectory(900)
+    law, error = study.SYSTEMS["RayleighBenard"], 3e-2
+    t, x = law.trajectory(600)
     noisy = x + 0.004 * x.std(axis=0) * np.random.default_rng(0).standard_normal(x.shape)
     plain, told = (vl.discover(t, noisy, systematic=e) for e in (None, error * noisy[None]))
     assert study.score(told, law).exact
@@ -75,10 +66,10 @@ def test_an_error_of_scale_changes_error_bars_alone(error):
 def test_errors_of_the_axes_do_not_explain_the_noise():
     """How far axes are from right angles is told to what is given, not beyond."""
     law, rng = study.SYSTEMS["NoseHoover"].shift([0.5, 0.5, 0.5]), np.random.default_rng(1)
-    t, x = law.trajectory(900)
+    t, x = law.trajectory(600)
     lean = 0.005 * np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]])
     noisy = x + 0.01 * x.std(axis=0) * rng.multivariate_normal(
-        np.zeros(3), np.ones((3, 3)) * 0.7 + 0.3 * np.eye(3), 900
+        np.zeros(3), np.ones((3, 3)) * 0.7 + 0.3 * np.eye(3), 600
     )
     found = vl.discover(t, noisy, systematic=(noisy @ lean)[None])
     assert study.score(found, law).exact
@@ -87,18 +78,6 @@ def test_errors_of_the_axes_do_not_explain_the_noise():
     kept = found.system.support
     apart = (found.coefficients - true)[kept] / found.standard_errors[kept]
     assert np.sqrt(np.mean(apart**2)) < 2
-
-
-@pytest.mark.slow
-def test_missing_rows_and_several_trajectories():
-    truth, t, x, modes = distorted("SprottE", 0, 1e-4)
-    x[100:104] = np.nan
-    modes[:, 100:104] = np.nan
-    whole = vl.discover(t, x, systematic=modes)
-    halves = [(t[:150], x[:150]), (t[150:], x[150:])]
-    parts = vl.discover(halves, systematic=[modes[:, :150], modes[:, 150:]])
-    assert study.score(whole, truth).exact
-    assert study.score(parts, truth).exact
 
 
 @pytest.mark.parametrize(
