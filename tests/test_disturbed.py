@@ -66,16 +66,12 @@ assert profile == "quick"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("seed", "hair", "fails"), [(None, 12, False), (1, 12, True), (1, 6, False)]
-)
-def test_what_holds_by_a_hair_fails(tmp_path, shared_cache, seed, hair, fails):
-    (tmp_path / "hair.py").write_text(HAIR.replace("1e-12", f"1e-{hair}"))
-    failed = run_quickly(tmp_path / "hair.py", tmp_path, {}, shared_cache, seed)
-    assert ("AssertionError" in failed) == bool(failed) == fails
-    assert "colour: must be" in run_quickly(
-        tmp_path / "hair.py", tmp_path, {"colour": 1}, shared_cache
-    )
+def test_what_holds_by_a_hair_fails(tmp_path, shared_cache):
+    hair = tmp_path / "hair.py"
+    hair.write_text(HAIR)
+    assert run_quickly(hair, tmp_path, {}, shared_cache) == ""
+    assert "AssertionError" in run_quickly(hair, tmp_path, {}, shared_cache, seed=1)
+    assert "colour: must be" in run_quickly(hair, tmp_path, {"colour": 1}, shared_cache)
 
 
 @pytest.mark.slow
