@@ -94,9 +94,6 @@ def test_messages_name_the_remedy():
     x = np.c_[np.cos(t), -np.sin(t)]
     stamps = [datetime(2024, 3, 1) + timedelta(seconds=s) for s in t]
     differences = np.diff([*stamps, stamps[-1] + timedelta(1)])
-    seconds = np.array(stamps, "datetime64[us]")
-    seconds = (seconds - seconds[0]) / np.timedelta64(1, "s")
-    np.testing.assert_allclose(seconds, t, atol=1e-6)
     for given, said in (
         ((stamps, x), r"got dates|give seconds since the first: with t = np.array\(t, 'datetime64"),
         ((np.array(stamps, "datetime64[us]"), x), "give seconds since the first"),
@@ -111,6 +108,3 @@ def test_messages_name_the_remedy():
             vl.discover(*given, degree=1)
     with pytest.raises(ValueError, match="systematic: must have shape"):
         vl.discover(t, x, systematic=object())
-    for build in (lambda: vl.Hint(frame=1, box=(10**400, 2, 3, 4)), lambda: vl.Scene(occluders=5)):
-        with pytest.raises(ValueError, match="must be"):
-            build()

@@ -308,13 +308,6 @@ def test_a_film_of_a_swing(tmp_path):
     assert float(found.period.value) == pytest.approx(2 * np.pi / np.sqrt(9.81 / 0.5), rel=2e-3)
 
 
-@pytest.mark.slow
-def test_a_film_of_a_plane_that_lies_askew_is_doubted(tmp_path):
-    found = telephone(tmp_path / "film.mp4", thrown, 0.6, pan=0.6)
-    assert found.status == "suspect"
-    assert any("the plane lies askew" in doubt for doubt in found.warnings)
-
-
 # --------------------------------------------------------------------------------------- real clips
 
 

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
 from vidsindy_lite import Library, PolynomialSystem
@@ -85,28 +84,6 @@ def test_one_throw_tells_quadratic_drag_that_is_the_same_in_all_directions():
     drags, errors = (part[rows, [3, 4, 5]] for part in (found.coefficients, found.standard_errors))
     np.testing.assert_allclose([drags, errors], [drags[:1], errors[:1]] * np.ones(3), rtol=1e-9)
     assert abs(drags[0] + 0.05) < 5 * errors[0] < 0.002
-
-
-def test_an_orbit_with_drag_turns_sharply_at_its_lowest_point():
-    """There the first knots are too wide for the law, and a fit on them does not converge."""
-
-    def slope(_, state):
-        place, velocity = state[:2], state[2:]
-        return [*velocity, *(-2 * place / np.hypot(*place) ** 3 - 0.03 * velocity)]
-
-    t = np.linspace(0, 25, 1000)
-    x = solve_ivp(slope, (0, 25), (1.5, 0, 0, 1.3), t_eval=t, rtol=1e-11, atol=1e-12).y[:2].T
-    x += 0.003 * x.std(axis=0) * np.random.default_rng(0).normal(size=x.shape)
-    library = Library.terms(
-        {
-            "r/r^3": lambda x, y: np.array([x, y]) / np.hypot(x, y) ** 3,
-            "spring": lambda x, y: [x, y],
-            "drag": lambda vx, vy: [vx, vy],
-        }
-    )
-    found = vl.discover(t, x, library=library)
-    assert found.status == "ok"
-    assert found.system.text(2) == "x'' = -2 r/r^3_x - 0.03 drag_x\ny'' = -2 r/r^3_y - 0.03 drag_y"
 
 
 def test_a_law_of_the_path_with_a_pole_on_the_curve_is_none():
@@ -239,12 +216,10 @@ def test_a_law_is_saved_and_its_own_functions_are_given_again(tmp_path):
         (Library(), "library: must hold a term"),
         ("polynomial(3)", "library: must be of type Library"),
         (Library.terms({"a": lambda q: q}), r"arguments of 'a' must be named .*\(x, y\), .* got q"),
-        (Library.terms({"a": np.hypot}), r"arguments of 'a' .* as in lambda .*, got x1, x2$"),
         (Library.fourier(10**6), r"library: must have at most 1000 sines and cosines, got [246]0"),
         (Library.polynomial(60), r"library: must have at most 1000 monomials, got 1891 of degree"),
         (Library.terms({"x": lambda x: x**2}), "a term must have a name of its own, got 'x' twice"),
         (Library.terms({"s": lambda x: math.sin(x)}), "'s' must take and return arrays .* Type"),
-        (Library.terms({"a": lambda: 1.0}), r"arguments of 'a' .* got none"),
         (Library.terms({"a": lambda x: 1.0}), r"'a' must return an array of the shape"),
         (
             Library.terms({"a": lambda x: [x, x, x]}),
@@ -278,7 +253,6 @@ def test_a_library_that_does_not_suit_is_refused_in_one_line(library, words):
     [
         (lambda: Library.parse("polynomial(3) + tan(1)"), r"a sum of .*'tan\(1\)'"),
         (lambda: Library.fourier(0), "harmonics: must be an integer of at least 1, got 0"),
-        (lambda: Library.parse(3), "text: must be of type str, got 3"),
         (lambda: Library.terms({"a": 1}), "functions: must map names to functions, got 'a': 1"),
         (
             lambda: Library.terms({"a": np.sin}) + Library.terms({"a": np.cos}),
@@ -300,10 +274,6 @@ def test_a_product_of_coordinates_is_named_alike_in_every_library():
     terms = {"x": {"xy": 1.0, "x^2": 2.0}, "y": {"sin(x)": 3.0}}
     law = PolynomialSystem.from_terms(terms, library=wave)
     assert law.text() == "dx/dt = 2 x^2 + xy\ndy/dt = 3 sin(x)"
-    own = Library.polynomial(2) + Library.terms({"xy": lambda x, y: np.exp(x * y)})
-    law = PolynomialSystem.from_terms({"x": {"x": 1.0}, "y": {"xy": 3.0}}, library=own)
-    assert len(set(law.terms)) == len(law.terms)
-    assert "x y" in law.terms
 
 
 def test_a_velocity_in_the_library_asks_for_order_2():

@@ -199,7 +199,6 @@ def test_an_input_is_a_spline_and_unknown_outside():
             lambda: Library.inputs(T, {"u": np.where(T > 3, np.nan, T)}),
             r"u must be finite, got NaN or infinity at t = 3\.0",
         ),
-        (lambda: Library.inputs([], {"u": []}), r"t: must hold at least one time.* got shape \(0,"),
         (lambda: Library.inputs(T, {"u v": T}), "inputs: must be named like variables.* got 'u v'"),
         (lambda: Library.inputs([1.0], {"u": [1.0]}), "at least 2 samples, got 1"),
         (lambda: Library.inputs([T, T], {"u": [T]}), r"one per trajectory \(2\), got 1"),

@@ -8,10 +8,8 @@ import vidsindy_lite as vl
 from vidsindy_lite.dynamics.l0 import inverse
 from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.orientation import (
-    _turns,
     apart,
     in_axes,
-    turned,
     with_turns,
 )
 from vidsindy_lite.dynamics.solver import _solved, _Task
@@ -89,23 +87,6 @@ def solved(terms, degree, start, span=20.0, noise=0.01):
 def own_errors(fit, model):
     """Standard errors of what is free, by a quadratic model, in standard units."""
     return np.sqrt(np.diag(inverse(model.of(np.flatnonzero(fit.state.free())).information)))
-
-
-def test_what_a_small_turn_changes_is_what_is_left_of_turned_laws():
-    _, problem, fit = solved(DUFFING, 3, [1.5, 0.4])
-    law, units, step = problem.law(fit.state), problem.units, 1e-5
-    y = np.random.default_rng(1).normal(size=(50, 2))  # standard points, from the law's own origin
-
-    def slopes(angle):
-        turn = turned(np.array([angle]), 2)
-        inward = (turn.T @ units.point(y + fit.state.offset).T).T
-        return law(units.standard(inward) - fit.state.offset) * units.scale @ turn.T / units.scale
-
-    change = _turns(problem, fit.state)[: law.coefficients.size, 0].reshape(2, -1).T
-    expected = (slopes(step) - slopes(-step)) / (2 * step)
-    found = law.library(y) @ change
-    sign = np.sign(np.sum(found * expected))  # which way is positive does not matter
-    np.testing.assert_allclose(sign * found, expected, atol=1e-6 * np.abs(expected).max())
 
 
 def test_axes_that_are_not_known_make_errors_larger():

@@ -1,6 +1,5 @@
 """The path of laws: a first law, smooth errors, plateaus that compete, and which law persists."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,12 +8,11 @@ from scipy.interpolate import make_interp_spline
 
 from vidsindy_lite.dynamics import path as paths
 from vidsindy_lite.dynamics.bspline import Segment
-from vidsindy_lite.dynamics.collocation import State, Status
 from vidsindy_lite.dynamics.data import check_trajectory
 from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.model import Form, PolynomialSystem
 from vidsindy_lite.dynamics.path import LARGEST
-from vidsindy_lite.dynamics.problem import FINAL_WEIGHT, fit_curves, pose
+from vidsindy_lite.dynamics.problem import pose
 from vidsindy_lite.dynamics.result import History
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import (
@@ -133,31 +131,6 @@ def test_all_data_decide_on_the_terms_of_a_part(monkeypatch):
     assert sum(len(s.t) for s in fit.collocation.segments) == 1500
     assert "subset search, all data" in [step.stage for step in history.steps]
     assert fit.state.active.sum() == 2
-
-
-def test_axes_that_moved_for_nothing_come_home_if_the_fit_has_converged():
-    problem, history = posed([np.linspace(0, 20, 400)]), History()
-    collocation = problem.weighted(problem.collocation(problem.segments()), FINAL_WEIGHT)
-    control = fit_curves(collocation, problem.curves)
-    active = CIRCLE.support
-    state = State(control, 0.0 * active, active, problem.origin, np.ones(2, dtype=bool))
-    start = collocation.solve(state)
-    moved = paths.select(problem, start, FINAL_WEIGHT, "moved", history)
-    assert moved.state.moving.all()
-    assert not paths.framed(problem, moved, history).state.moving.any()
-    unfinished = replace(moved, status=Status.MAX_STEPS)
-    assert paths.framed(problem, unfinished, history) is unfinished
-
-
-def test_of_long_data_a_search_has_enough_turns_and_samples():
-    """A turn takes 2 pi in standard units."""
-    problem = posed([np.linspace(0, 20, 400)])
-    for time, count in ((4e3, 10**5), (1e5, 10**4)):
-        t = np.linspace(0, time, count)
-        long = replace(problem, stretches=[(0, (t, np.ones((count, 2))))])
-        ((_, (part, _)),) = paths.enough(long)
-        wanted = max(paths.ENOUGH_TURNS * 2 * np.pi, paths.ENOUGH_SAMPLES / count * time)
-        assert part[-1] == pytest.approx(wanted, abs=2 * time / count)
 
 
 def test_a_law_is_found_where_the_path_around_it_leads_nowhere_else(monkeypatch):

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Library, PolynomialSystem, discover
-from vidsindy_lite.dynamics.diagnostics import _periods, cancelling, shapes, tied
+from vidsindy_lite.dynamics.diagnostics import cancelling, shapes, tied
 from vidsindy_lite.study import SYSTEMS
 
 TIMES = np.linspace(0, 12, 600)
@@ -155,10 +155,3 @@ def test_a_law_on_a_shape_is_never_simply_ok(name, order):
     noisy = x + 0.01 * x.std() * np.random.default_rng(0).standard_normal(x.shape)
     found = discover(TIMES, noisy, order=order, degree=2 if name == "bob" else 3)
     assert any(words in warning for warning in found.warnings)
-
-
-def test_laps_that_differ_by_their_noise_are_laps():
-    t, rng = 0.02 * np.arange(3000), np.random.default_rng(0)
-    x = np.sqrt(2) * np.sin(2 * np.pi / 5 * t)[:, None] + 0.5 * rng.standard_normal((3000, 1))
-    assert _periods(t, x / x.std(), 0.5, len(t))[0] == pytest.approx(5, abs=0.3)
-    assert _periods(t, x / x.std(), 0.1, len(t)) == []  # better known, they are none

@@ -121,8 +121,6 @@ def test_seeds_are_local_and_repeatable(name, short_grid):
     first, again, other = (BASELINES[name](t, x, seed=seed).coefficients for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert not np.array_equal(first, other)
-    with pytest.raises(ValueError, match="x: must hold 5 samples in a row"):
-        BASELINES[name](T[:4], X[:4], seed=1)
     np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
 
 
@@ -141,10 +139,6 @@ def test_bad_input(name, short_grid):
     method = BASELINES[name]
     with pytest.raises(ValueError, match="t: must increase"):
         method(T[::-1], X)
-    with pytest.raises(ValueError, match="x: must not be infinite"):
-        method(T, np.where(X > 10, np.inf, X))
-    with pytest.raises(ValueError, match=r"x: must have shape \(n, d\)"):
-        method(T, X[:, 0])
     with pytest.raises(ValueError, match="x: must hold 5 samples in a row"):
         method(T[:4], X[:4])
     with pytest.raises(ValueError, match="degree"):
