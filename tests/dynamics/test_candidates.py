@@ -192,24 +192,6 @@ def test_a_sum_is_a_union():
     assert Library.parse(str(fractions)) == fractions
 
 
-def test_a_law_is_saved_and_its_own_functions_are_given_again(tmp_path):
-    _, t, x = swing(n=400)
-    library = Library.polynomial(1) + Library.terms({"restoring": lambda x: np.sin(x)})
-    for name, held in (("sines", PENDULUM), ("own", library)):
-        found = vl.discover(t, x, order=2, library=held)
-        found.save(tmp_path / name)
-        again = vl.Discovery.load(tmp_path / name, library=None if name == "sines" else held)
-        assert again.equations() == found.equations()
-        np.testing.assert_array_equal(again.predict([0.3, 1.0]), found.predict([0.3, 1.0]))
-    library = Library.polynomial(0) + DRAG
-    found = vl.discover(*thrown(), order=2, library=library)
-    found.save(tmp_path / "vector")
-    again = vl.Discovery.load(tmp_path / "vector", library=library)
-    np.testing.assert_array_equal(again.predict(np.ones(6)), found.predict(np.ones(6)))
-    with pytest.raises(ValueError, match=r"library: must hold the function 'restoring'"):
-        vl.Discovery.load(tmp_path / "own")
-
-
 @pytest.mark.parametrize(
     ("library", "words"),
     [

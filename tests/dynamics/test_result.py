@@ -150,6 +150,8 @@ def test_another_function_of_the_same_name_is_refused(pendulum, tmp_path):
     for other in (lambda x: np.tanh(x), lambda x: 1.001 * np.sin(x), lambda x: x * np.nan):
         with pytest.raises(ValueError, match="library: .* function 'restoring' that the law was"):
             vl.Discovery.load(tmp_path / "law", Library.terms({"restoring": other}))
+    with pytest.raises(ValueError, match="library: must hold the function 'restoring'"):
+        vl.Discovery.load(tmp_path / "law")
     # What a file of an earlier version does not hold is not compared.
     content = json.loads((tmp_path / "law").read_text())
     del content["functions"]
@@ -220,7 +222,7 @@ def test_a_newcomer_is_what_least_squares_gives_it(seed):
 
 
 def test_intervals_hold_what_is_absent():
-    """Nothing, and a term too weak to be found_in."""
+    """Nothing, and a term too weak to be found."""
     covered, weak = [], []
     for seed in range(4):
         one = found_in(weak_spring(), seed).absent

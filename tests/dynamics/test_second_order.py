@@ -126,22 +126,6 @@ def test_one_throw_is_called_undetermined():
     assert any("several runs" in warning for warning in found.warnings)
 
 
-SPRING = {(f"v{i}", term) for i in "xyz" for term in (i, f"v{i}", f"{i}^3")}
-
-
-@pytest.mark.slow
-def test_an_anharmonic_damped_spring_in_space_and_the_place_where_it_rests():
-    t, rest = np.linspace(0, 12, 750), np.array([3.0, -2.0, 5.0])
-    stiff = np.array([30.0, 34.0, 40.0])
-    x = moving(lambda x, v: -stiff * x - 0.25 * v - 25 * x**3, [1, 0.5, -0.3], [0, 2, 1.5], t)
-    found = discover(t, noisy(x, 0.01, seed=3) + rest, order=2)
-    shifted = {(f"v{i}", term) for i in "xyz" for term in ("1", f"{i}^2")}
-    assert found_terms(found.system).keys() == SPRING | shifted
-    assert found_terms(found.native).keys() == SPRING
-    assert (np.abs(found.offset[:3] - rest) < 4 * found.offset_errors[:3]).all()
-    assert found.status == "ok", found.warnings
-
-
 def test_an_order_that_is_none():
     t = np.linspace(0, 1, 50)
     for order in (3, 0, 2.0, "second", True):
