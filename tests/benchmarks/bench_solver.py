@@ -86,14 +86,6 @@ def test_time_and_memory_are_linear_in_the_samples():
     assert peaks[-1] < 1
 
 
-@pytest.mark.parametrize(("n", "noise", "bar"), [(15000, 0, 8), (60000, 0.1, 12)])
-def test_long_data(n, noise, bar):
-    truth, t, x = measured("Lorenz", noise, n)
-    spent, found = seconds(discover, t, x)
-    note("long data", f"{n}, noise {noise:.0%}", spent, "s", bar)
-    assert score(found, truth).exact
-
-
 def lorenz_exam(seed=0):
     """The public exam of the paper's model: 401 samples at 20 Hz, noise 5 % of the RMS."""
     law, t = SYSTEMS["Lorenz"], np.arange(401) / 20

@@ -52,17 +52,12 @@ def seconds(function):
 def test_clean_textured_video(tmp_path, background):
     truth = lorenz_track(100)
     path = tmp_path / "clip.mkv"
-    writing = seconds(lambda: render_video(path, truth, Scene(background), seed=100))
+    render_video(path, truth, Scene(background), seed=100)
     decoding = min(seconds(lambda: sum(1 for _ in read_video(path))) for _ in range(REPEATS))
     tracking = min(seconds(lambda: track(path)) for _ in range(REPEATS))
     error = np.linalg.norm(track(path).pixels - truth, axis=1)
     rms = np.sqrt(np.mean(error**2))
-    print(
-        f"\n{background}: rms {rms:.4f} px, lost {np.isnan(error).sum()}; ms a frame: "
-        f"render and write {1e3 * writing / FRAMES:.2f}, decode {1e3 * decoding / FRAMES:.2f}, "
-        f"track {1e3 * tracking / FRAMES:.2f} (ratio {tracking / decoding:.2f}); "
-        f"{path.stat().st_size / FRAMES / 1e3:.1f} kB a frame"
-    )
+    print(f"\n{background}: rms {rms:.4f} px, time over decoding {tracking / decoding:.2f}")
     assert np.isfinite(error).all()
     assert rms <= 0.1
     assert tracking <= 2 * decoding
@@ -70,20 +65,12 @@ def test_clean_textured_video(tmp_path, background):
 
 def test_unseen_random_scenes(tmp_path):
     path = tmp_path / "clip.mkv"
-    errors = []
     for seed in range(200, 220):
         truth, scene = lorenz_track(seed), Scene.random(seed)
         error = np.linalg.norm(
             track(render_video(path, truth, scene, seed=seed)).pixels - truth, axis=1
         )
-        errors.append(error)
-        print(
-            f"\n{scene.background:7s} {scene.shape:9s} {scene.size:4.1f} px {scene.colour:7s} "
-            f"kept {np.isfinite(error).mean():.4f} median {np.nanmedian(error):.4f} "
-            f"max {np.nanmax(error):.4f} px",
-            end="",
-        )
-    for error in errors:
+        print(f"\n{scene}: {np.isfinite(error).mean():.4f}, {np.nanmedian(error):.4f} px", end="")
         assert np.isfinite(error).mean() >= 0.99
         assert np.nanmedian(error) <= 0.15
 
@@ -105,10 +92,7 @@ def test_learned_detector_on_unseen_kinds_of_scenes(variance):
             times.append(time.perf_counter() - began)
             errors.append(np.linalg.norm(found[0].centre - true) if found else np.inf)
     errors = np.array(errors)
-    print(
-        f"\nvariance {variance}: median {np.median(errors):.3f} px, found "
-        f"{np.mean(errors < 5):.4f}, {1e3 * np.median(times):.1f} ms a frame"
-    )
+    print(f"\n{np.median(errors):.3f} px, {1e3 * np.median(times):.1f} ms a frame")
     assert np.median(errors) <= 0.5
     assert np.mean(errors < 5) >= 0.99
     assert np.median(times) < 0.03

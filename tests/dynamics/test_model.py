@@ -39,9 +39,7 @@ def test_terms_are_read_in_any_usual_spelling():
     for law in laws:
         assert law.coefficients[law.terms.index("x^2y"), 0] == 2.0
         assert law.support.sum() == 1
-
-
-def test_long_names_are_kept_apart():
+    # Long names are kept apart.
     law = PolynomialSystem.from_terms({"x1": {"x1 x10": 1}, "x10": {"x10^2": -3}})
     assert law.terms[-3:] == ("x1^2", "x1 x10", "x10^2")
     assert "x_{10}" in law.latex()
