@@ -12,16 +12,11 @@ from scipy.integrate import solve_ivp
 
 from vidsindy_lite.vision import (
     BACKGROUNDS,
-    SHAPES,
-    LearnedDetector,
     Scene,
-    detections,
     read_video,
-    render,
     render_video,
     track,
 )
-from vidsindy_lite.vision.training import SEEN_BACKGROUNDS, SEEN_SHAPES
 
 FRAMES = 1500
 REPEATS = 3
@@ -73,26 +68,3 @@ def test_unseen_random_scenes(tmp_path):
         print(f"\n{scene}: {np.isfinite(error).mean():.4f}, {np.nanmedian(error):.4f} px", end="")
         assert np.isfinite(error).mean() >= 0.99
         assert np.nanmedian(error) <= 0.15
-
-
-@pytest.mark.parametrize("variance", [0, 0.01])
-def test_learned_detector_on_unseen_kinds_of_scenes(variance):
-    detector = LearnedDetector()
-    backgrounds = sorted(set(BACKGROUNDS) - set(SEEN_BACKGROUNDS))
-    shapes = sorted(set(SHAPES) - set(SEEN_SHAPES))
-    errors, times = [], []
-    for seed in range(300, 330):
-        rng = np.random.default_rng(seed)
-        fixed = {"background": str(rng.choice(backgrounds)), "shape": str(rng.choice(shapes))}
-        scene = Scene.random(rng, noise_variance=variance, **fixed)
-        truth = rng.uniform(30, 481, (10, 2))
-        for frame, true in zip(render(truth, scene, seed), truth, strict=True):
-            began = time.perf_counter()
-            found = detections(detector.predict(frame))
-            times.append(time.perf_counter() - began)
-            errors.append(np.linalg.norm(found[0].centre - true) if found else np.inf)
-    errors = np.array(errors)
-    print(f"\n{np.median(errors):.3f} px, {1e3 * np.median(times):.1f} ms a frame")
-    assert np.median(errors) <= 0.5
-    assert np.mean(errors < 5) >= 0.99
-    assert np.median(times) < 0.03

@@ -95,7 +95,7 @@ def test_a_law_of_the_path_with_a_pole_on_the_curve_is_none():
         },
         library=Library.polynomial(3) + Library.rational(2),
     )
-    t = np.linspace(0, 10, 512)
+    t = np.linspace(0, 10, 256)
     x = law.simulate(t, [0.1, 30.4])
     x += 1e-5 * x.std(axis=0) * np.random.default_rng(0).normal(size=x.shape)
     found = vl.discover(t, x, library=Library.polynomial(3) + Library.rational(2), order=1)

@@ -251,6 +251,7 @@ def test_a_wrong_sample_is_told_where_the_law_does_not_meet_it():
 LONG = np.linspace(0.0, 60.0, 1000)
 
 
+@pytest.mark.thorough
 def test_errors_that_a_poor_law_leaves_are_not_taken_for_kicks():
     """The first law shows kicks; the one that is found under them holds exactly."""
     rng = np.random.default_rng(3)

@@ -59,7 +59,7 @@ from vidsindy_lite.study.sweeps import sweep
 
 if __name__ == "__main__":
     tasks = [toy.Task(*task) for task in json.loads(sys.argv[1])]
-    print(json.dumps(sweep(toy.square, tasks, desc="toy")))
+    print(json.dumps(sweep(toy.square, tasks, desc="toy", jobs=int(sys.argv[2]))))
 """
 
 
@@ -92,11 +92,11 @@ class Clone:
         files = {"CALLS": str(self.calls), "THREADS": str(self.root / "threads.txt")}
         return os.environ | {"PYTHONPATH": str(self.root)} | files
 
-    def start(self, tasks, **environment):
+    def start(self, tasks, jobs=2, **environment):
         """A process that sweeps over tasks, each a list of a number and a pause in seconds."""
         self.calls.write_text("")
         return subprocess.Popen(
-            [sys.executable, str(self.root / "sweep.py"), json.dumps(tasks)],
+            [sys.executable, str(self.root / "sweep.py"), json.dumps(tasks), str(jobs)],
             env=self.environment | environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
             text=True, start_new_session=True,
         )  # fmt: skip
@@ -186,7 +186,7 @@ DAMAGES = [
 @pytest.mark.slow
 def test_what_is_stored_is_found_unless_it_is_damaged_or_of_other_code(clone):
     tasks = [[number, 0.0] for number in range(1, 6)]
-    assert clone.sweep(tasks) == results_of(tasks)
+    assert clone.sweep(tasks, jobs=1) == results_of(tasks)
     assert clone.called() == [1, 2, 3, 4, 5]
     stored = clone.stored()
     whole = {number: file.read_bytes() for number, file in stored.items()}
@@ -194,11 +194,11 @@ def test_what_is_stored_is_found_unless_it_is_damaged_or_of_other_code(clone):
         stored[number].write_bytes(damage(whole[number]))
     clone.edit("toy.py", "# a comment", "# another")
     clone.edit("companion/pages.py", "1", "2")
-    assert clone.sweep(tasks) == results_of(tasks)
+    assert clone.sweep(tasks, jobs=1) == results_of(tasks)
     assert clone.called() == [2, 3, 4, 5]
     assert {number: file.read_bytes() for number, file in stored.items()} == whole
     clone.edit("powers.py", "number**2", "number * number")
-    assert clone.sweep(tasks) == results_of(tasks)
+    assert clone.sweep(tasks, jobs=1) == results_of(tasks)
     assert clone.called() == [1, 2, 3, 4, 5]
 
 
