@@ -281,22 +281,7 @@ def test_the_version(capsys):
     assert project["project"]["version"] == vl.__version__
 
 
-def test_an_interruption_shows_no_traceback(tracked, capsys, monkeypatch):
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("vidsindy_lite.pipeline.discover_from_tracks", interrupted)
-    assert main(["discover", "--rig", "rig.toml", "--tracks", "a.csv"]) == 130
-    assert capsys.readouterr().err == "\nstopped; files are as they were\n"
-    assert not list(tracked.glob("*report*"))
-
-
 @pytest.mark.slow
 def test_demo_goes_from_videos_to_the_law(capsys):
     assert main(["demo", "--system", "SprottE", "--frames", "200"]) == 0
     assert "against the truth: all true terms found, 0 false" in capsys.readouterr().out
-
-
-def test_demo_that_cannot_work_says_why(capsys):
-    assert main(["demo", "--frames", "10"]) == 2
-    assert "x: must hold at least as many samples as unknowns" in capsys.readouterr().err

@@ -317,12 +317,6 @@ def test_a_rival_of_higher_degree_is_told():
     assert "x^5" in " ".join(w for w in found.warnings if "another law may" in w)
 
 
-def test_a_polynomial_of_a_library_of_fractions_is_asked_for_more_as_well():
-    data = OdeContest(14, start=1).data()  # a fraction, too small to be seen where x is large
-    found = discover(data.t, data.x, library=Library.polynomial(3) + Library.rational(1))
-    assert any(WORDS in warning for warning in found.warnings)
-
-
 @pytest.mark.parametrize(("degree", "status"), [(1, "suspect"), (3, "ok")])
 def test_a_numerator_that_lacks_a_term_is_no_motion_that_is_kicked(degree, status):
     """Drag over 1 + x^2 needs x^2 vx there; without it, what is missed looks like kicks."""

@@ -55,14 +55,6 @@ def test_a_forced_oscillator_is_found_with_its_input_and_foretold(order, noise):
     assert r"\mathrm{u}" in law.latex()
 
 
-def test_the_origin_of_a_forced_law_is_found():
-    found = vl.discover(T, noisy(FORCED[:, :1], 0.01) + 2, library=CUBIC + U, order=2)
-    assert found.offset[0] == pytest.approx(2, abs=4 * found.offset_errors[0])
-    assert terms(found.native, "vx") == {"x", "vx", "x^3", "u"}
-    again = found.native.shift(found.offset)
-    np.testing.assert_allclose(again.coefficients, found.coefficients, atol=1e-9)
-
-
 @pytest.fixture(scope="module")
 def forced():
     """What is found of the positions of the forced oscillator."""

@@ -138,15 +138,6 @@ def test_wrong_shapes_are_named():
             use("abc")
 
 
-@pytest.mark.parametrize("degree", [-1, 2.0, True, None])
-def test_degrees_are_whole_numbers(degree):
-    with pytest.raises(ValueError, match="degree: must be an integer of at least 0, got"):
-        monomial_exponents(2, degree)
-    if degree is not None:
-        with pytest.raises(ValueError, match="degree: must be"):
-            PolynomialSystem.from_terms({"x": {"1": 1}}, degree=degree)
-
-
 # -------------------------------------------------------------------------------------------- paths
 
 

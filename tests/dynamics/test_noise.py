@@ -206,15 +206,6 @@ def test_residuals_that_are_exactly_zero_are_no_accident(share):
         assert (variance > 0).all()
 
 
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("n", [2, 9])
-def test_fewer_errors_than_stretches_have_precisions_too(n):
-    residual = np.random.default_rng(n).standard_normal(n)
-    precision = weighing._factors(residual, [np.linspace(1, 2, n)])
-    assert precision.shape == (n,)
-    assert (np.isfinite(precision) & (precision >= 0)).all()
-
-
 @pytest.mark.parametrize(
     ("slopes", "start", "noise"),
     [

@@ -101,14 +101,6 @@ def test_an_orbit_that_shrinks_or_is_rich_is_not_too_plain():
     assert "closed orbit" in told(cycle[300:], t=TIMES[300:] * 5, terms=30)
 
 
-@pytest.mark.parametrize("step", [0.5, 2.0])
-def test_a_predator_and_its_prey_are_no_bob(step):
-    t = np.arange(15) * step
-    x = solved(lambda _, s: [s[0] * (1 - s[1]), s[1] * (s[0] - 1)], (0.5, 1.2), t)
-    for share in (0.002, 0.05):
-        assert "circle" not in told(x, share, t=t)
-
-
 @pytest.mark.parametrize(("amplitude", "doubted"), [(0.8, True), (3.0, False)])
 def test_a_line_and_a_sine_may_be_a_cubic(amplitude, doubted):
     library = Library.polynomial(1) + Library.fourier(1)

@@ -33,17 +33,6 @@ def test_counts_and_errors_of_a_case_done_by_hand():
     assert result.max_coefficient_error == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
-@pytest.mark.parametrize("offset", [(0, 0, 0), REFERENCE_OFFSET])
-def test_the_truth_scores_perfectly(name, offset):
-    truth = SYSTEMS[name].shift(offset)
-    result = score(truth, truth)
-    assert result.exact
-    assert (result.precision, result.recall, result.l2) == (1, 1, 0)
-    assert result.max_coefficient_error == 0
-    assert (~np.isnan(result.coefficient_errors) == truth.support).all()
-
-
 @given(st.permutations(range(10)), st.integers(0, 2**32 - 1))
 def test_order_and_size_of_the_library_do_not_matter(order, seed):
     rng = np.random.default_rng(seed)
