@@ -77,6 +77,7 @@ def test_pulls_of_the_true_terms_that_were_found():
 NOTHING = PolynomialSystem(TRUTH.names, TRUTH.exponents, 0 * TRUTH.coefficients)
 SINE = PolynomialSystem.from_terms({"x": {"sin(x)": -1.0}}, library=Library.fourier())
 LINE = PolynomialSystem.from_terms({"x": {"x": -1.0}})
+ENZYME = PolynomialSystem.from_terms({"x": {"x x'": -2.0}}, library=Library.rational(1))
 
 
 def test_nothing_found():
@@ -97,6 +98,7 @@ def test_nothing_found():
         (score, 1, TRUTH, r"found: must be a PolynomialSystem \(.*\), got 1"),
         (score, TRUTH, SimpleNamespace(system=TRUTH), "truth: must be a Poly.*found comes first"),
         (score, LINE, SINE, "found: must have a library with the functions"),
+        (score, LINE, ENZYME, "found: must have a library with the functions"),
         (trajectory_error, np.zeros((3, 2)), np.zeros((4, 2)), r"x: must have the shape of truth"),
         (trajectory_error, np.full((4, 2), np.nan), np.zeros((4, 2)), "x: must hold at least one"),
     ],
