@@ -38,6 +38,7 @@ def test_terms_are_known_forbidden_or_alone_allowed():
 def test_of_second_order_the_accelerations_are_given():
     posed = form(QUADRATIC.where({"vx": {"x": -4}}), order=2)
     assert posed.law(posed.known).text() == "x'' = -4 x\ny'' = 0"
+    assert form(QUADRATIC, order=2).movable.tolist() == [True, True, False, False]
     with pytest.raises(ValueError, match=r"library: must give terms of an equation of vx, vy, got"):
         form(QUADRATIC.where({"x": {"vx": 1}}), order=2)
 
