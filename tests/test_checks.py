@@ -40,7 +40,6 @@ def refused(check, values, message):
         *refused(check_positive, [0, -1e-9], "n: must be positive, got "),
         *refused(check_array, ["abc", ["1", "2"], [1j], [[1], [1, 2]], object()], ARRAY),
         *refused(check_array, [np.arange(3).astype("datetime64[s]")], ARRAY),
-        *refused(check_array, [np.array([1, 2j], dtype=object)], ARRAY),
         *refused(lambda n, x: check_vector(n, x, 2), [[1, 2, 3], [1, np.nan], [[1, 2]]], VECTOR),
         *refused(lambda _, t: check_times(t), [[], 3.0], "t: must hold at least one time"),
         (lambda _, t: check_times(t), [0, np.inf], "t: must be finite, got inf"),
@@ -89,21 +88,12 @@ def test_masked_entries_are_missing(dtype):
     assert masked.data.tolist() == [0, 1, 2, 3]
 
 
-def test_a_value_is_shown_in_one_line():
-    with pytest.raises(ValueError, match="x: must be an array of real numbers, got") as caught:
-        check_array("x", np.ones((9, 2)) + 1j)
-    assert "\n" not in str(caught.value)
-
-
 def test_messages_name_the_remedy():
     """Dates, time differences, one coordinate, single precision, which of many, the times."""
     t = np.linspace(0, 10, 60)
     x = np.c_[np.cos(t), -np.sin(t)]
     stamps = [datetime(2024, 3, 1) + timedelta(seconds=s) for s in t]
     differences = np.diff([*stamps, stamps[-1] + timedelta(1)])
-    seconds = np.array(stamps, "datetime64[us]")
-    seconds = (seconds - seconds[0]) / np.timedelta64(1, "s")
-    np.testing.assert_allclose(seconds, t, atol=1e-6)
     for given, said in (
         ((stamps, x), r"got dates|give seconds since the first: with t = np.array\(t, 'datetime64"),
         ((np.array(stamps, "datetime64[us]"), x), "give seconds since the first"),
@@ -112,13 +102,9 @@ def test_messages_name_the_remedy():
         ((t, x[:, 0]), r"got \(60,\): one coordinate is a column, x\[:, None\]"),
         (([(t, x), (t, x), (t, np.nan * x), (t, x)],), "60 rows of NaN, in trajectory 2"),
         ((t, pd.DataFrame({"time": t, "x": x[:, 0]})), "got the times as column 'time'"),
-        ((t, np.full(x.shape, 10**400, object)), "x: must be an array of real numbers"),
         ((t, np.full(x.shape, 10**5000, object)), "x: must be an array of real numbers"),
     ):
         with pytest.raises(ValueError, match=said):
             vl.discover(*given, degree=1)
     with pytest.raises(ValueError, match="systematic: must have shape"):
         vl.discover(t, x, systematic=object())
-    for build in (lambda: vl.Hint(frame=1, box=(10**400, 2, 3, 4)), lambda: vl.Scene(occluders=5)):
-        with pytest.raises(ValueError, match="must be"):
-            build()

@@ -45,55 +45,19 @@ def here(folder, tmp_path, monkeypatch):
     return tmp_path
 
 
-VIDEOS = ["a.avi", "b.avi", "c.avi"]
-
-
-@pytest.mark.slow
-def test_from_videos_to_a_report(here, capsys):
-    status = main(["discover", *VIDEOS, "--rig", "rig.toml", "--degree", "2", "--out", "law"])
-    shown = capsys.readouterr()
-    data = json.loads((here / "law" / "result.json").read_text("utf-8"))
-    assert status == (0 if data["status"] == "ok" else 1)
-    assert "dx/dt = " in shown.out
-    assert f"status: {data['status']}" in shown.out
-    assert "track" in shown.err  # progress
-    np.testing.assert_allclose([c["lag"] for c in data["cameras"]], (0, 7, 0), atol=0.05)
-    assert [c["frames"] for c in data["cameras"]] == [220, 208, 210]
-    assert data["options"]["lags"] == "learned"
-    assert data["t"][30] == pytest.approx(1.0)
-    assert data["law"]["data"]["equations"] in (here / "law" / "report.html").read_text("utf-8")
-
-
-def corrupt(folder):
-    (folder / "bad.avi").write_bytes(b"no video at all" * 100)
-
-
-def cut_off(folder):
-    content = (folder / "c.avi").read_bytes()
-    (folder / "bad.avi").write_bytes(content[: len(content) // 2])
-
-
-def one_frame(folder):
-    frame = next(vl.read_video(folder / "a.avi"))
-    vl.write_video(folder / "bad.avi", [frame], codec="MJPG")
-
-
-def empty(folder):
-    (folder / "bad.avi").touch()
-
-
 @pytest.mark.parametrize(
-    ("spoil", "message"),
+    ("content", "message"),
     [
-        (lambda folder: None, "error: videos: no such video file, got 'bad.avi'"),
-        (corrupt, "error: videos: must be a video file that PyAV can read, got 'bad.avi'"),
-        (cut_off, "bad.avi must hold the 210 frames that its header states, got"),
-        (one_frame, "bad.avi must be a video, got a single frame"),
-        (empty, "must be a video file, got the empty file 'bad.avi'"),
+        (None, "error: videos: no such video file, got 'bad.avi'"),
+        (b"no video", "error: videos: must be a video file that PyAV can read, got 'bad.avi'"),
+        (b"", "must be a video file, got the empty file 'bad.avi'"),
+        ("half", "bad.avi must hold the 210 frames that its header states, got"),
     ],
 )
-def test_a_bad_file_gives_one_error_and_no_report(here, capsys, spoil, message):
-    spoil(here)
+def test_a_bad_file_gives_one_error_and_no_report(here, capsys, content, message):
+    whole = (here / "c.avi").read_bytes()
+    if content is not None:
+        (here / "bad.avi").write_bytes(whole[: len(whole) // 2] if content == "half" else content)
     assert main(["discover", "a.avi", "b.avi", "bad.avi", "--rig", "rig.toml"]) == 2
     (error,) = [line for line in capsys.readouterr().err.splitlines() if "error" in line]
     assert message in error
@@ -111,42 +75,33 @@ def test_a_bad_file_gives_one_error_and_no_report(here, capsys, spoil, message):
             ["--rig", "rig.toml", "--lag=0,0,-210"],
             "in common with the first (220 frames), got -210 for c.avi (210 frames)",
         ),
-        (["--rig", "none.toml", "--detector", "none.onnx"], "detector: no such file, got"),
         (["--rig", "rig.toml", "--fps", "0"], "fps: must be positive, got 0"),
-        (["--rig", "rig.toml", "--fps", "fast"], "fps: must be a number, got 'fast'"),
         (["--rig", "rig.toml", "--lag", "0,soon,0"], "lag: must be numbers with commas between"),
         (["--rig", "rig.toml", "--library", "tan(1)"], "library: must be a sum of polynomial("),
         (["--rig", "rig.toml", "--seed", "x"], "seed: must be an integer, got 'x'"),
-        (["--rig", "rig.toml", "--order", "3"], "order: must be one of 1, 2, auto, got '3'"),
         (["--rig", "rig.toml", "--loud"], "unrecognized arguments: --loud"),
         (
             ["--rig", "rig.toml", "--degree", "2", "--library", "fourier(1)"],
             "degree: must not be given with a library, got 2 and fourier(1)",
         ),
-        (
-            ["--rig", "rig.toml", "--library", "polynomial(1); x: q = 0"],
-            "library: 'q' is no term of the equation of x, which has 1, x, y, z",
-        ),
-        (["--rig", "rig.toml", "--out", "\udcff"], r"must be made of characters, got '\udcff'"),
     ],
 )
 def test_bad_options_are_told_before_anything_is_tracked(here, capsys, options, message):
-    assert main(["discover", *VIDEOS, *options]) == 2
+    assert main(["discover", "a.avi", "b.avi", "c.avi", *options]) == 2
     shown = capsys.readouterr().err
     assert shown.startswith("error: ")
     assert message in shown
     assert shown.count("\n") == 1
 
 
-@pytest.mark.parametrize("fps", [31, 15])
-def test_one_rate_is_not_given_for_files_that_state_others(here, capsys, fps):
+def test_one_rate_is_not_given_for_files_that_state_others(here, capsys):
     frames = list(vl.read_video(here / "c.avi"))
-    vl.write_video(here / "other.avi", frames, fps=fps, codec="MJPG")
+    vl.write_video(here / "other.avi", frames, fps=31, codec="MJPG")
     videos = ["a.avi", "b.avi", "other.avi"]
     assert main(["discover", *videos, "--rig", "rig.toml", "--fps", "30"]) == 2
     message = (
         "error: t: may be given, as --fps may, only for videos of one frame rate, got files that "
-        f"state 30, 30, {fps}: leave it out, so that the rate of each file counts, or convert"
+        "state 30, 30, 31: leave it out, so that the rate of each file counts, or convert"
     )
     shown = capsys.readouterr().err
     assert message in shown
@@ -157,10 +112,8 @@ def test_one_rate_is_not_given_for_files_that_state_others(here, capsys, fps):
     ("command", "message"),
     [
         (["rig-template", "--size", "640"], "size: must be two integers like 1920x1080, got '640'"),
-        (["rig-template", "--size", "10000000x64"], "size: must be at most 32768 a side, got"),
         (["rig-template", "--cameras", "1"], "cameras: must be an integer of at least 2, got 1"),
         (["discver"], "COMMAND: must be one of discover, pick, "),
-        (["demo", "--frames", "1"], "frames: must be an integer of at least 2, got 1"),
         (["rig-import", "none.toml"], "files: no such calibration file, got 'none.toml'"),
         (["pick", "none.mkv"], "videos: no such video file"),
     ],
@@ -176,22 +129,6 @@ def test_what_makes_no_sense_is_one_line_that_names_what_was_typed(
     assert not shown.out
 
 
-def test_the_help_helps(capsys):
-    with pytest.raises(SystemExit, match="0"):
-        main(["discover", "--help"])
-    shown = capsys.readouterr().out
-    for word in ("--rig", "--out", "--lag", "--fps", "--degree", "--seed", "exit status", "report"):
-        assert word in shown
-
-
-def test_a_template_to_fill_in(tmp_path, capsys):
-    assert main(["rig-template", "--cameras", "4", "--size", "640x480"]) == 0
-    (tmp_path / "rig.toml").write_text(capsys.readouterr().out, encoding="utf-8")
-    rig = vl.Rig.load(tmp_path / "rig.toml")
-    assert len(rig.cameras) == 4
-    assert rig.cameras[0].image_size == (640, 480)
-
-
 # ------------------------------------------------------------------ tracks, refusals, interruptions
 
 
@@ -200,22 +137,27 @@ def tracked(tmp_path, monkeypatch):
     """Text files of tracks and a rig."""
     monkeypatch.chdir(tmp_path)
     truth = study.SYSTEMS["Lorenz"].shift(study.REFERENCE_OFFSET)
-    _, x = truth.trajectory(200)
+    _, x = truth.trajectory(100)
     rig = vl.Rig.around(x)
     rig.uncalibrated(0).save("rig.toml")
     for name, camera in zip("abc", rig.cameras, strict=True):
         rows = (f"{i},{u:.9f},{v:.9f}" for i, (u, v) in enumerate(camera.project(x)))
         (tmp_path / f"{name}.csv").write_text("\n".join(["frame,u,v", *rows]))
-    (tmp_path / "still.csv").write_text("u,v\n" + "200,200\n" * 200)
     (tmp_path / "1.csv").write_text("u,v\n1,2\n")
     return tmp_path
 
 
 def test_from_tracks_to_a_report_and_back(tracked, capsys):
+    text = (tracked / "a.csv").read_text().splitlines()
+    rows = [f"{int(row.split(',')[0]) / 50:.6f},{row.partition(',')[2]}" for row in text[1:]]
+    (tracked / "timed.csv").write_text("\n".join(["t,u,v", *rows]))
     command = ["discover", "--rig", "rig.toml", "--degree", "2", "--tracks"]
-    assert main([*command, "a.csv", "b.csv", "c.csv", "--fps", "25"]) == 0
+    assert main([*command, "timed.csv", "b.csv", "c.csv", "--fps", "25"]) == 1
+    told = "fps: 25 frames in a unit of time are taken as given, though timed.csv states 50"
+    shown = capsys.readouterr().out
+    assert told in shown
+    assert "report: report/report.html" in shown
     first = json.loads((tracked / "report" / "result.json").read_text())
-    assert "report: report/report.html" in capsys.readouterr().out
     assert main([*command, "report/tracks.csv", "--out", "again"]) == 0
     again = json.loads((tracked / "again" / "result.json").read_text())
     both = (data["law"]["data"]["terms"] for data in (first, again))
@@ -224,45 +166,28 @@ def test_from_tracks_to_a_report_and_back(tracked, capsys):
         assert one["coefficient"] == pytest.approx(other["coefficient"], rel=1e-4)
 
 
-def test_frames_in_a_unit_of_time_that_contradict_the_file_are_told(tracked, capsys):
-    text = (tracked / "a.csv").read_text().splitlines()
-    rows = [f"{int(row.split(',')[0]) / 50:.6f},{row.partition(',')[2]}" for row in text[1:]]
-    (tracked / "timed.csv").write_text("\n".join(["t,u,v", *rows]))
-    command = ["discover", "--rig", "rig.toml", "--degree", "2", "--tracks"]
-    assert main([*command, "timed.csv", "b.csv", "c.csv", "--fps", "25"]) == 1
-    told = "fps: 25 frames in a unit of time are taken as given, though timed.csv states 50"
-    assert told in capsys.readouterr().out
-    assert main([*command, "timed.csv", "b.csv", "c.csv", "--fps", "50"]) == 0
-
-
 def test_a_refusal_has_one_line_and_a_picture(tracked, capsys):
     command = ["discover", "--rig", "rig.toml", "--fps", "25", "--tracks"]
-    assert main([*command, "a.csv", "still.csv", "c.csv"]) == 2
+    assert main([*command, "a.csv", "b.csv", "c.csv", "--degree", "7"]) == 2
     (line,) = [one for one in capsys.readouterr().err.splitlines() if one.startswith("error:")]
-    assert (
-        "likely causes, in this order: the tracker (look at still.csv), the lags, the rig" in line
-    )
+    assert "x: must hold at least as many samples as unknowns" in line
+    assert "; likely causes, in this order: the rig, the lags, the tracker; " in line
     assert line.endswith("; the tracks are drawn in report/report.html")
     assert {path.name for path in (tracked / "report").iterdir()} == {
         "report.html", "result.json", "tracks.csv",
     }  # fmt: skip
-    assert main([*command, "a.csv", "b.csv", "c.csv", "--degree", "2"]) == 0  # takes its place
-    assert (tracked / "report" / "rig.toml").exists()
-
-
-def test_frames_of_files_count_from_the_start_of_their_videos(tracked):
+    # Frames of files count from the start of their videos; a report takes the place of that.
     for name, cut in (("a", 5), ("b", 9)):
         header, *rows = (tracked / f"{name}.csv").read_text().split("\n")
         (tracked / f"{name}.csv").write_text("\n".join([header, *rows[cut:]]))
-    command = ["discover", "--rig", "rig.toml", "--fps", "25", "--degree", "2", "--lag", "0,0,0"]
-    assert main([*command, "--tracks", "a.csv", "b.csv", "c.csv"]) == 0
+    assert main([*command, "a.csv", "b.csv", "c.csv", "--degree", "2", "--lag", "0,0,0"]) == 0
+    assert (tracked / "report" / "rig.toml").exists()
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ([], "videos: give either one video per camera, or --tracks"),
-        (["a.csv", "--tracks", "b.csv"], "videos: give either one video per camera, or --tracks"),
         (["--tracks", "a.csv", "b.csv", "c.csv"], "t: must be given, or fps, as a.csv states no"),
         (["--tracks", "a.csv", "none.csv"], "tracks: no such file, got 'none.csv'"),
         (["--tracks", "a.csv", "--fps", "9"], "tracks: must be one per camera, got 1 for 3"),
@@ -279,11 +204,15 @@ def test_bad_tracks_are_told(tracked, capsys, options, message):
     assert not (tracked / "report").exists()
 
 
-def test_a_full_disk_is_one_line_and_the_law_is_told(tracked, capsys, monkeypatch):
+@pytest.fixture
+def full_disk(monkeypatch):
     def full(path, *_):
         raise OSError(28, "No space left on device", str(path))
 
     monkeypatch.setattr(Path, "write_bytes", full)
+
+
+def test_a_full_disk_is_one_line_and_the_law_is_told(tracked, capsys, full_disk):
     command = ["discover", "--rig", "rig.toml", "--fps", "25", "--degree", "2", "--tracks"]
     assert main([*command, "a.csv", "b.csv", "c.csv"]) == 2
     shown = capsys.readouterr()
@@ -293,15 +222,11 @@ def test_a_full_disk_is_one_line_and_the_law_is_told(tracked, capsys, monkeypatc
     assert not list(tracked.glob("*report*"))
 
 
-def test_a_refusal_without_a_picture_is_told_all_the_same(tracked, capsys, monkeypatch):
-    def full(path, *_):
-        raise OSError(28, "No space left on device", str(path))
-
-    monkeypatch.setattr(Path, "write_bytes", full)
-    command = ["discover", "--rig", "rig.toml", "--fps", "25", "--tracks"]
-    assert main([*command, "a.csv", "still.csv", "c.csv"]) == 2
+def test_a_refusal_without_a_picture_is_told_all_the_same(tracked, capsys, full_disk):
+    command = ["discover", "--rig", "rig.toml", "--fps", "25", "--degree", "7", "--tracks"]
+    assert main([*command, "a.csv", "b.csv", "c.csv"]) == 2
     (line,) = [one for one in capsys.readouterr().err.splitlines() if one.startswith("error:")]
-    assert "the target's motion must determine" in line
+    assert "x: must hold at least as many samples as unknowns" in line
     assert "the tracks could not be drawn: [Errno 28] No space left on device" in line
 
 
@@ -318,12 +243,19 @@ def test_every_kind_of_film_under_any_name(folder, tmp_path, monkeypatch, capsys
             path = tmp_path / f"{prefix}{i:04d}.png{ending}"
             path.write_bytes(cv2.imencode(".png", frame[..., ::-1])[1].tobytes())
     command = ["discover", *names, "--rig", str(folder / "rig.toml"), "--fps", "30"]
-    assert main([*command, "--degree", "2", "--out", "$報告 'r'"]) in (0, 1)
-    shown = capsys.readouterr().out
-    assert "report: $報告 'r'/report.html" in shown
+    status = main([*command, "--degree", "2", "--out", "$報告 'r'"])
+    shown = capsys.readouterr()
+    assert "report: $報告 'r'/report.html" in shown.out
+    assert "track" in shown.err  # progress
     data = json.loads((tmp_path / "$報告 'r'" / "result.json").read_text("utf-8"))
+    assert status == (0 if data["status"] == "ok" else 1)
+    assert f"status: {data['status']}" in shown.out
     assert [camera["video"] for camera in data["cameras"]] == names
-    assert data["cameras"][1]["lag"] == pytest.approx(7, abs=0.1)
+    np.testing.assert_allclose([c["lag"] for c in data["cameras"]], (0, 7, 0), atol=0.05)
+    assert [c["frames"] for c in data["cameras"]] == [220, 208, 210]
+    assert (data["options"]["lags"], data["t"][30]) == ("learned", pytest.approx(1.0))
+    report = (tmp_path / "$報告 'r'" / "report.html").read_text("utf-8")
+    assert data["law"]["data"]["equations"] in report
 
 
 def test_ctrl_c_ends_the_command_in_one_line(tracked, interruptible):
@@ -349,22 +281,7 @@ def test_the_version(capsys):
     assert project["project"]["version"] == vl.__version__
 
 
-def test_an_interruption_shows_no_traceback(tracked, capsys, monkeypatch):
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("vidsindy_lite.pipeline.discover_from_tracks", interrupted)
-    assert main(["discover", "--rig", "rig.toml", "--tracks", "a.csv"]) == 130
-    assert capsys.readouterr().err == "\nstopped; files are as they were\n"
-    assert not list(tracked.glob("*report*"))
-
-
 @pytest.mark.slow
 def test_demo_goes_from_videos_to_the_law(capsys):
     assert main(["demo", "--system", "SprottE", "--frames", "200"]) == 0
     assert "against the truth: all true terms found, 0 false" in capsys.readouterr().out
-
-
-def test_demo_that_cannot_work_says_why(capsys):
-    assert main(["demo", "--frames", "10"]) == 2
-    assert "x: must hold at least as many samples as unknowns" in capsys.readouterr().err

@@ -15,7 +15,7 @@ def case():
     return rig, [camera.project(x) for camera in rig.cameras]
 
 
-@pytest.mark.parametrize("lag", [75.5, -76, 1e12, -1e300])
+@pytest.mark.parametrize("lag", [75.5, -76, -1e300])
 def test_a_hopeless_lag_is_named(case, lag):
     rig, tracks = case
     message = (
@@ -69,27 +69,16 @@ def test_the_residual_is_that_of_the_given_lags(case):
     assert given.lags.residual > 0.1
 
 
-@pytest.fixture(scope="module")
-def noisy():
-    """Times and path of Lorenz' system, and what three cameras see of it with noise of 15 %."""
+def test_a_law_from_noisy_tracks_does_not_bend_the_path_to_fit_their_noise():
+    """Three cameras see Lorenz' system with noise of 15 %."""
     truth = study.SYSTEMS["Lorenz"].shift(study.REFERENCE_OFFSET)
-    t, x = truth.trajectory(1000)
+    t, x = truth.trajectory(700)
     rig, rng = vl.Rig.around(x), np.random.default_rng(3)
     tracks = [study.add_noise(camera.project(x), 0.15, rng) for camera in rig.cameras]
     seen = vl.observe_tracks(tracks, rig.uncalibrated(keep=0), t, lags="synchronous")
-    return truth, t, seen
-
-
-def test_systematic_errors_are_those_of_the_motion_not_of_the_noise(noisy):
-    # Neighbouring frames are alike; a mode made of noisy tracks would jump as these do.
-    _, _, seen = noisy
+    # Systematic errors are those of the motion: made of noisy tracks, they would jump as these do.
     jumps = np.diff(seen.systematic, axis=1).std(axis=1) / seen.systematic.std(axis=1)
     assert jumps.max() < 0.4
-
-
-@pytest.mark.slow
-def test_a_law_from_noisy_tracks_does_not_bend_the_path_to_fit_their_noise(noisy):
-    truth, t, seen = noisy
     found = vl.discover(t, seen.x, systematic=seen.systematic)
     assert study.score(found, truth).exact
     assert study.score(found, truth).l2 < 0.02

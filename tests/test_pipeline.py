@@ -1,9 +1,7 @@
 """From video files to equations, and what is refused on the way."""
 
 from dataclasses import replace
-from itertools import islice
 
-import cv2
 import numpy as np
 import pytest
 
@@ -33,33 +31,18 @@ def test_exact_equations_from_video_files(shot):
     assert not any("rig" in warning for warning in found.warnings)
 
 
-@pytest.mark.parametrize(("wrong", "calibrated"), [(0, 1), (2, 3)])
-def test_a_wrong_normal_is_named_first(shot, wrong, calibrated):
+def test_a_wrong_normal_is_named_first(shot):
     middle = (shot.x.min(axis=0) + shot.x.max(axis=0)) / 2
     cameras = [replace(camera, position=middle) for camera in shot.rig.cameras]
-    normal = cameras[wrong].normal
-    cameras[wrong] = replace(cameras[wrong], normal=rodrigues([0, 0, 1], np.deg2rad(20)) @ normal)
-    rig = vl.Rig(cameras) if calibrated == 3 else vl.Rig(cameras).uncalibrated()
-    text = vl.observe(shot.paths, rig, shot.t).warnings[0]
+    normal = cameras[2].normal
+    cameras[2] = replace(cameras[2], normal=rodrigues([0, 0, 1], np.deg2rad(20)) @ normal)
+    found = vl.observe(shot.paths, vl.Rig(cameras), shot.t)
+    text = found.warnings[0]
+    assert found.status == "suspect"
     assert text.startswith("the rig does not agree with the tracks: ")
-    assert f"of cameras[{wrong}] (Lorenz_{wrong + 1}.mov) would explain it best" in text
+    assert "of cameras[2] (Lorenz_3.mov) would explain it best" in text
     proposed = [float(number) for number in text.split("normal (")[1].split(")")[0].split(",")]
     np.testing.assert_allclose(proposed, normal, atol=5e-3)
-
-
-def test_a_wrong_position_is_named_first(shot):
-    first, *others = shot.rig.cameras
-    moved = replace(first, position=first.position + np.array([0, 5.0, 5.0]))
-    found = vl.observe(shot.paths, vl.Rig([moved, *others]), shot.t)
-    assert found.status == "suspect"
-    assert found.warnings[0].startswith("the rig does not agree with the tracks: ")
-    assert "the position (" in found.warnings[0]
-    assert "of cameras[0] (Lorenz_1.mov) would explain it best" in found.warnings[0]
-
-
-def test_time_of_a_frame_comes_from_the_frame_rate(shot):
-    found = vl.observe(shot.paths, shot.rig)
-    np.testing.assert_allclose(found.t, np.arange(200) / 25)
 
 
 def test_same_seed_same_film(tmp_path):
@@ -70,13 +53,6 @@ def test_same_seed_same_film(tmp_path):
     for ours, theirs in zip(films[0].paths, films[1].paths, strict=True):
         pairs = zip(vl.read_video(ours), vl.read_video(theirs), strict=True)
         assert all((a == b).all() for a, b in pairs)
-
-
-def test_unknown_benchmark_or_seed_is_named(tmp_path):
-    with pytest.raises(ValueError, match="name: must be one of Lorenz, .* got 'Lorentz'"):
-        film("Lorentz", tmp_path)
-    with pytest.raises(ValueError, match="seed: must be an integer of at least 0, got 1.5"):
-        film("Lorenz", tmp_path, seed=1.5)
 
 
 @pytest.fixture(scope="module")
@@ -118,6 +94,7 @@ def test_a_wrong_lag_of_zero_is_not_accepted(shot, late):
 
 def test_a_lag_that_is_slightly_wrong_is_not_blamed_on_the_rig(shot):
     found = vl.observe(shot.paths, shot.rig, lags=(0, 0.4, 0))
+    np.testing.assert_allclose(found.t, np.arange(200) / 25)  # by the frame rate of the files
     assert found.lags.frames.tolist() == [0, 0.4, 0]
     assert found.warnings[0].startswith(
         "the rig does not agree with the tracks at the lags that are given: in one frame of ten, "
@@ -132,15 +109,6 @@ def test_different_frame_rates(shot, tmp_path):
     np.testing.assert_allclose(found.lags.rates, (1, 1, 0.5))
     np.testing.assert_allclose(found.lags.frames, 0, atol=0.01)
     assert np.nanmax(np.abs(found.x - shot.x)) < 5 * shot.rig.cameras[0].scale
-
-
-def test_a_grey_video(shot, tmp_path):
-    frames = islice(vl.read_video(shot.paths[0]), 80)
-    grey = (cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY) for frame in frames)
-    path = vl.write_video(tmp_path / "grey.mkv", (np.dstack([g] * 3) for g in grey))
-    error = vl.track(path).pixels - shot.tracks[0][:80]
-    assert np.isfinite(error).all(axis=1).mean() > 0.8
-    assert np.sqrt(np.nanmean(error**2)) < 0.5
 
 
 @pytest.fixture(scope="module")
@@ -165,12 +133,9 @@ def test_a_video_that_is_cut_off_is_named(shot, cut_off):
         ({"t": np.arange(10)}, {}, r"t: must have shape \(200,\), one per frame of the .* \(10,\)"),
         ({"rig": "rig.toml"}, {}, "rig: must be of type Rig, got 'rig.toml'"),
         ({"paths": "a.mkv"}, {}, "paths: must be a list of files, .* got 'a.mkv'"),
-        ({"paths": None}, {}, "paths: must be a list of files, .* got None"),
         ({"paths": ["a.mkv", None, "c.mkv"]}, {}, r"paths\[1\]: must be the name of a file"),
         ({"paths": ["\udcff.mkv"] * 3}, {}, r"paths\[0\]: must be made of characters, got"),
         ({}, {"degree": 0}, "degree: must be an integer of at least 1, got 0"),
-        ({}, {"degree": 2.0}, "degree: must be an integer of at least 1, got 2.0"),
-        ({}, {"degree": True}, "degree: must be an integer of at least 1, got True"),
         ({}, {"library": "fourier(1)"}, "library: must be of type Library, got 'fourier"),
         ({}, {"origin": "home"}, "origin: must be one of learn, data, got 'home'"),
         ({}, {"orientation": "mine"}, "orientation: must be one of data, learn, got 'mine'"),
@@ -179,8 +144,6 @@ def test_a_video_that_is_cut_off_is_named(shot, cut_off):
         ({}, {"detector": "yolo"}, "detector: must be one of auto, background, learned, or"),
         ({}, {"seed": -1}, "seed: must be an integer of at least 0, got -1"),
         ({"t": np.arange(200)[::-1]}, {}, "t: must increase"),
-        ({"t": np.where(np.arange(200) == 7, np.nan, np.arange(200))}, {}, "t: must be finite"),
-        ({"t": "soon"}, {}, "t: must be an array of real numbers"),
     ],
 )
 def test_what_is_cheap_is_checked_before_a_video_is_tracked(
@@ -191,7 +154,7 @@ def test_what_is_cheap_is_checked_before_a_video_is_tracked(
         vl.discover_from_videos(**given, **options)
 
 
-def test_a_rig_without_calibrated_camera_is_refused_before_tracking(shot, cut_off):
+def test_no_film_is_tracked_without_a_calibrated_camera(shot, cut_off):
     cameras = [replace(camera, scale=None, angle=None) for camera in shot.rig.cameras]
     with pytest.raises(ValueError, match="rig: at least one camera must be calibrated"):
         vl.discover_from_videos([cut_off, *shot.paths[1:]], vl.Rig(cameras))

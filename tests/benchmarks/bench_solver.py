@@ -10,10 +10,9 @@ import tracemalloc
 from pathlib import Path
 
 import numpy as np
-import pysindy
 import pytest
 
-from vidsindy_lite.dynamics import PolynomialSystem, discover
+from vidsindy_lite.dynamics import discover
 from vidsindy_lite.study import (
     REFERENCE_OFFSET,
     SYSTEMS,
@@ -85,54 +84,6 @@ def test_time_and_memory_are_linear_in_the_samples():
     note("samples", "15000 over 1500", spent[-1] / spent[0], "ratio", "12")
     assert spent[-1] <= 12 * spent[0]
     assert peaks[-1] < 1
-
-
-@pytest.mark.parametrize("noise", [0, 0.2])
-def test_time_against_ensembles(noise):
-    """E-SINDy of 50 models with one threshold given, and with its threshold chosen as in `study`.
-
-    The second is what a user runs who does not know the truth; its models are scaled to 50.
-    """
-    _, t, x = measured("Lorenz", noise)
-
-    def given():
-        least_squares = pysindy.STLSQ(threshold=0.2, alpha=baselines.RIDGE)
-        fifty = pysindy.EnsembleOptimizer(least_squares, bagging=True, n_models=50)
-        library = pysindy.PolynomialLibrary(degree=3)
-        pysindy.SINDy(optimizer=fifty, feature_library=library).fit(x, t=t[1] - t[0])
-
-    ours, one, chosen = (
-        min(seconds(method)[0] for _ in range(3))
-        for method in (lambda: discover(t, x), given, lambda: baselines.ensemble(t, x))
-    )
-    for case, value in (("threshold given", one), ("threshold chosen", 2.5 * chosen)):
-        note("time over E-SINDy's", f"{case}, noise {noise:.0%}", ours / value, "ratio", "0.3")
-
-
-@pytest.mark.parametrize(("n", "noise", "bar"), [(15000, 0, 8), (60000, 0.1, 12)])
-def test_long_data(n, noise, bar):
-    truth, t, x = measured("Lorenz", noise, n)
-    spent, found = seconds(discover, t, x)
-    note("long data", f"{n}, noise {noise:.0%}", spent, "s", bar)
-    assert score(found, truth).exact
-
-
-@pytest.mark.parametrize("degree", [1, 2, 3, 4])
-def test_terms(degree):
-    _, t, x = measured("Lorenz", 0.05)
-    spent, found = seconds(discover, t, x, degree=degree)
-    note("terms", f"degree {degree}: {found.coefficients.size}", spent, "s")
-
-
-@pytest.mark.parametrize("d", [1, 2, 3, 4])
-def test_dimension(d):
-    chain = {name: {name: -0.05} for name in "xyzw"[:d]}
-    for left, right in zip("xyzw"[:d], "xyzw"[1:d], strict=False):
-        chain[left][right], chain[right][left] = 1.0, -1.0
-    law = PolynomialSystem.from_terms(chain, degree=3)
-    t = np.linspace(0, 30, 1000)
-    x = add_noise(law.simulate(t, np.arange(1.0, d + 1)), 0.02, np.random.default_rng(0))
-    note("dimension", d, seconds(discover, t, x)[0], "s")
 
 
 def lorenz_exam(seed=0):

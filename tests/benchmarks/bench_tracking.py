@@ -12,18 +12,11 @@ from scipy.integrate import solve_ivp
 
 from vidsindy_lite.vision import (
     BACKGROUNDS,
-    SHAPES,
-    LearnedDetector,
     Scene,
-    detections,
     read_video,
-    render,
-    render_restless,
     render_video,
     track,
-    write_video,
 )
-from vidsindy_lite.vision.training import SEEN_BACKGROUNDS, SEEN_SHAPES
 
 FRAMES = 1500
 REPEATS = 3
@@ -54,17 +47,12 @@ def seconds(function):
 def test_clean_textured_video(tmp_path, background):
     truth = lorenz_track(100)
     path = tmp_path / "clip.mkv"
-    writing = seconds(lambda: render_video(path, truth, Scene(background), seed=100))
+    render_video(path, truth, Scene(background), seed=100)
     decoding = min(seconds(lambda: sum(1 for _ in read_video(path))) for _ in range(REPEATS))
     tracking = min(seconds(lambda: track(path)) for _ in range(REPEATS))
     error = np.linalg.norm(track(path).pixels - truth, axis=1)
     rms = np.sqrt(np.mean(error**2))
-    print(
-        f"\n{background}: rms {rms:.4f} px, lost {np.isnan(error).sum()}; ms a frame: "
-        f"render and write {1e3 * writing / FRAMES:.2f}, decode {1e3 * decoding / FRAMES:.2f}, "
-        f"track {1e3 * tracking / FRAMES:.2f} (ratio {tracking / decoding:.2f}); "
-        f"{path.stat().st_size / FRAMES / 1e3:.1f} kB a frame"
-    )
+    print(f"\n{background}: rms {rms:.4f} px, time over decoding {tracking / decoding:.2f}")
     assert np.isfinite(error).all()
     assert rms <= 0.1
     assert tracking <= 2 * decoding
@@ -72,81 +60,11 @@ def test_clean_textured_video(tmp_path, background):
 
 def test_unseen_random_scenes(tmp_path):
     path = tmp_path / "clip.mkv"
-    errors = []
     for seed in range(200, 220):
         truth, scene = lorenz_track(seed), Scene.random(seed)
         error = np.linalg.norm(
             track(render_video(path, truth, scene, seed=seed)).pixels - truth, axis=1
         )
-        errors.append(error)
-        print(
-            f"\n{scene.background:7s} {scene.shape:9s} {scene.size:4.1f} px {scene.colour:7s} "
-            f"kept {np.isfinite(error).mean():.4f} median {np.nanmedian(error):.4f} "
-            f"max {np.nanmax(error):.4f} px",
-            end="",
-        )
-    for error in errors:
+        print(f"\n{scene}: {np.isfinite(error).mean():.4f}, {np.nanmedian(error):.4f} px", end="")
         assert np.isfinite(error).mean() >= 0.99
         assert np.nanmedian(error) <= 0.15
-
-
-@pytest.mark.parametrize("seed", range(400, 403))
-def test_noise(tmp_path, seed):
-    truth = lorenz_track(seed)[:300]
-    scene = Scene.random(seed, noise_variance=0.01)
-    path = render_video(tmp_path / "clip.mov", truth, scene, seed=seed)
-    for detector in ("auto", "learned"):
-        error = np.linalg.norm(track(path, detector).pixels - truth, axis=1)
-        rms = np.sqrt(np.nanmean(error**2))
-        print(f"\n{detector}: rms {rms:.3f} px, found {np.isfinite(error).mean():.3f}", end="")
-        assert rms <= (0.5 if detector == "auto" else 1.0)
-
-
-@pytest.mark.parametrize(
-    ("background", "light"), [("bricks", 0.0), ("bricks", 0.1), ("sea", 0.1), ("hills", 0.1)]
-)
-@pytest.mark.parametrize("motion", ["tremble", "drift"])
-def test_restless(tmp_path, background, light, motion):
-    truth, k = lorenz_track(500)[:200], np.arange(200)
-    shifts = np.random.default_rng(500).normal(0, 3, (200, 2)).round().astype(int)
-    if motion == "drift":
-        shifts = np.column_stack([2 * k, 0 * k])
-    scene = Scene(background, "irregular", size=20, shape_seed=500)
-    frames = render_restless(truth, scene, shifts, 1 + light * np.sin(k / 10), seed=500)
-    path = write_video(tmp_path / "clip.mov", frames)
-    found = {name: track(path, name) for name in ("background", "learned", "auto")}
-    error = {name: np.linalg.norm(f.pixels - truth, axis=1) for name, f in found.items()}
-    print(f"\n{background}, {motion}, light {light}: auto takes {found['auto'].detector}", end="")
-    for name, values in error.items():
-        rms = np.sqrt(np.nanmean(values**2))
-        print(f"; {name} {np.mean(values < 1):.3f} within 1 px, rms {rms:.3f} px", end="")
-    assert found["auto"].warnings
-    assert np.sqrt(np.nanmean(error["learned"] ** 2)) <= 1
-    assert np.mean(error["learned"] < 2) >= 0.97
-    assert np.mean(error["auto"] < 2) >= 0.97
-
-
-@pytest.mark.parametrize("variance", [0, 0.01])
-def test_learned_detector_on_unseen_kinds_of_scenes(variance):
-    detector = LearnedDetector()
-    backgrounds = sorted(set(BACKGROUNDS) - set(SEEN_BACKGROUNDS))
-    shapes = sorted(set(SHAPES) - set(SEEN_SHAPES))
-    errors, times = [], []
-    for seed in range(300, 330):
-        rng = np.random.default_rng(seed)
-        fixed = {"background": str(rng.choice(backgrounds)), "shape": str(rng.choice(shapes))}
-        scene = Scene.random(rng, noise_variance=variance, **fixed)
-        truth = rng.uniform(30, 481, (10, 2))
-        for frame, true in zip(render(truth, scene, seed), truth, strict=True):
-            began = time.perf_counter()
-            found = detections(detector.predict(frame))
-            times.append(time.perf_counter() - began)
-            errors.append(np.linalg.norm(found[0].centre - true) if found else np.inf)
-    errors = np.array(errors)
-    print(
-        f"\nvariance {variance}: median {np.median(errors):.3f} px, found "
-        f"{np.mean(errors < 5):.4f}, {1e3 * np.median(times):.1f} ms a frame"
-    )
-    assert np.median(errors) <= 0.5
-    assert np.mean(errors < 5) >= 0.99
-    assert np.median(times) < 0.03

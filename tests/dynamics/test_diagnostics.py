@@ -8,16 +8,16 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
-from vidsindy_lite.dynamics import discover, monomial_exponents
+from vidsindy_lite.dynamics import discover
 from vidsindy_lite.dynamics.bspline import DEGREE, Segment
-from vidsindy_lite.dynamics.collocation import CLEANEST, Collocation, State, Status
+from vidsindy_lite.dynamics.collocation import Collocation, State, Status
 from vidsindy_lite.dynamics.data import Units, check_trajectories
-from vidsindy_lite.dynamics.diagnostics import Beyond, _higher, diagnose, outliers, untold_origins
+from vidsindy_lite.dynamics.diagnostics import Beyond, diagnose, outliers
 from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.model import Form, PolynomialSystem, runge_kutta_4
 from vidsindy_lite.dynamics.path import Plateau, follow
 from vidsindy_lite.dynamics.problem import pose
-from vidsindy_lite.study import SYSTEMS, corruption, score
+from vidsindy_lite.study import SYSTEMS, add_noise, corruption, score
 from vidsindy_lite.study.paper import FLOWS
 from vidsindy_lite.study.scoreboard import OdeContest
 
@@ -68,18 +68,6 @@ def far_off(t, x):
     return outliers(runs, [np.zeros(len(times), dtype=bool) for times, _ in runs])
 
 
-def told(duffing, dropped=None):
-    return diagnose(*fitted(duffing, dropped))
-
-
-def test_the_true_law_is_trusted(duffing):
-    assert told(duffing) == ()
-
-
-def test_a_missing_term_is_noticed(duffing):
-    assert any("x^3 in dy/dt" in d for d in told(duffing, "x^3"))
-
-
 def test_a_coordinate_that_lost_its_law_is_told(duffing):
     problem, fit, model, path, _ = fitted(duffing)
     law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {}}, degree=3)
@@ -91,61 +79,45 @@ def test_a_coordinate_that_lost_its_law_is_told(duffing):
 def test_a_law_in_the_data_that_is_not_the_native_one_is_told(duffing):
     problem, fit, model, path, law = fitted(duffing)
     assert diagnose(problem, fit, model, path, law) == ()
+    assert any("x^3 in dy/dt" in told for told in diagnose(*fitted(duffing, "x^3")))
     other = replace(law, coefficients=law.coefficients * [1.0, 1.5])
     (warning,) = diagnose(problem, fit, model, path, other)
     assert "the law in the frame of the data is not that in its own frame" in warning
 
 
-@pytest.mark.parametrize("size", [1e3, -1e6])
-def test_a_single_sample_far_off_is_named(duffing, size):
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("rows", [[300], [0, 1, 2], [597, 598, 599]])
+def test_samples_far_off_are_named(duffing, rows, sign):
     _, t, x = duffing
     x = x.copy()
     x[200:220] = np.nan
-    x[300, 1] = size
-    (warning,) = far_off(t, x)
-    assert f"a sample lies far from those before and after it: t = {t[300]:g}, x = (" in warning
-    assert f", {size:g})" in warning
-    x[[310, 320, 330, 340], 0] = size
-    (warning,) = far_off(t, x)
-    assert "and 2 more" in warning
-
-
-@pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("rows", [[0], [0, 1, 2], [597, 598, 599], [7, 8, 9]])
-def test_outliers_at_the_ends_and_in_a_row_are_named(duffing, rows, sign):
-    _, t, x = duffing
-    x = x.copy()
-    x[rows, 1] = 1e3 * sign ** np.arange(len(rows))
+    x[rows, 1] = 1e3 * sign ** np.arange(1, len(rows) + 1)
     (warning,) = far_off(t, x)
     places = warning.split("after it: ")[1].split(": no motion")[0].split("; ")
     assert [float(place.split(",")[0].removeprefix("t = ")) for place in places] == pytest.approx(
         t[rows], rel=1e-4
     )
+    x[[310, 320, 330, 340], 0] = 1e3
+    (warning,) = far_off(t, x)
+    assert f"and {len(rows) + 1} more" in warning
 
 
-@pytest.mark.parametrize("rate", [0.03, 0.3])
-def test_a_motion_that_comes_to_rest_is_no_outliers(rate):
-    k = np.arange(3000)
-    x = np.exp(-rate * k)[:, None] * np.column_stack((np.cos(0.2 * k), np.sin(0.2 * k)))
-    for states in (x, x[::-1], np.exp(-rate * k)[:, None]):
+def test_a_motion_that_comes_to_rest_is_no_outliers():
+    k = np.arange(1000)
+    x = np.exp(-0.03 * k)[:, None] * np.column_stack((np.cos(0.2 * k), np.sin(0.2 * k)))
+    for states in (x, x[::-1], np.exp(-0.3 * k)[:, None]):
         assert far_off(k, states) == []
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("law", [SYSTEMS["Lorenz"], SYSTEMS["NoseHoover"]])
-def test_noise_and_gaps_are_no_outliers(law):
+@pytest.mark.parametrize("samples_per_period", [100, 25])
+def test_noise_and_gaps_are_no_outliers(samples_per_period):
     rng = np.random.default_rng(0)
-    for n, samples_per_period in ((600, 100), (600, 25)):
-        t, clean = law.trajectory(n, samples_per_period)
-        noisy = [corruption.add_noise(clean, level, rng) for level in (0.05, 0.2, 0.5)]
-        hidden = [
-            corruption.drop_blocks(x, share, rng) for x in (clean, *noisy) for share in (0.3, 0.5)
-        ]
-        uneven = [np.sort(rng.choice(n, size, replace=False)) for size in (4 * n // 15, n // 15)]
-        parts = (slice(None), slice(0, 100), slice(-100, None), slice(0, 400), *uneven)
-        for x in (clean, *noisy, *hidden):
-            for part in parts:
-                assert far_off(t[part], x[part]) == []
+    t, clean = SYSTEMS["Lorenz"].trajectory(600, samples_per_period)
+    noisy = [add_noise(clean, level, rng) for level in (0.05, 0.5)]
+    hidden = [corruption.drop_blocks(x, 0.5, rng) for x in (clean, *noisy)]
+    for x in (clean, *noisy, *hidden):
+        for part in (slice(None), slice(-100, None), np.sort(rng.permutation(600)[:40])):
+            assert far_off(t[part], x[part]) == []
 
 
 @pytest.mark.parametrize(
@@ -161,27 +133,17 @@ def test_a_fit_that_did_not_converge_is_named_with_advice(duffing, status, words
     assert warning.endswith("use cleaner samples or a longer trajectory, or a lower degree")
 
 
-def test_clean_data_need_not_be_cleaner(duffing):
-    problem, fit, model, path, law = fitted(duffing)
-    collocation = replace(fit.collocation, data_weights=np.full(2, CLEANEST**-2))
-    clean = replace(fit, collocation=collocation, status=Status.STALLED)
-    told = diagnose(problem, clean, model, path, law)
-    (warning,) = [one for one in told if "did not converge" in one]
-    assert "use a longer trajectory, denser samples or other starts" in warning
-    assert not any("clean" in one for one in told)
-
-
 @pytest.mark.parametrize(
     ("noise", "times"),
     [(0.02, r"\d+\.\d times"), (1e-9, "more than 100 times")],
 )
 def test_a_misfit_has_a_size_in_units_of_the_data_and_of_their_spread(noise, times):
     # The constant of a decay changes after half of the time: the curve of no law meets both.
-    t = np.linspace(0, 40, 800)
+    t = np.linspace(0, 40, 400)
     drive = np.cos(t) + 0.1 * np.cos(2.3 * t), -np.sin(t) - 0.23 * np.sin(2.3 * t)
     x = 50 * np.stack(drive, axis=1)
     x += noise * x.std() * np.random.default_rng(3).standard_normal(x.shape)
-    told = " ".join(discover(t, x, order=1).warnings)
+    told = " ".join(discover(t, x, degree=1, order=1).warnings)
     number = r"(\d\S*)"
     pattern = f"data of ([xy]) by {number} \\({number} % of its spread, {times} the noise estimated"
     found = re.search(pattern, told)
@@ -233,16 +195,7 @@ def test_an_origin_that_the_data_do_not_tell_is_a_warning(seed):
     assert found.status == "suspect"
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.1])
-def test_the_same_law_around_another_origin_is_no_rival(noise):
-    # One law, two ways to write it: the constant of dx/dt, or an origin away from the data's.
-    truth = SYSTEMS["NoseHoover"].shift((10, 10, 0))
-    t, x = truth.trajectory(1000)
-    found = discover(t, corruption.add_noise(x, noise, np.random.default_rng(1)))
-    assert found.status == "ok"
-
-
-@pytest.mark.parametrize(("samples", "status"), [(1500, "ok"), (300, "suspect")])
+@pytest.mark.parametrize(("samples", "status"), [(900, "ok"), (300, "suspect")])
 def test_errors_that_last_are_a_misfit_only_if_few_are_independent(samples, status):
     truth = SYSTEMS["NoseHoover"].shift((5, 5, 5))
     t, x = truth.trajectory(samples)
@@ -251,62 +204,9 @@ def test_errors_that_last_are_a_misfit_only_if_few_are_independent(samples, stat
     assert all("times the noise estimated beforehand" in warning for warning in found.warnings)
 
 
-def test_what_a_law_misses_is_no_error_that_lasts_if_it_is_a_large_part_of_the_motion():
-    # A line for a relaxation oscillation: what it misses of two runs does not swing back.
-    law = PolynomialSystem.from_terms({"x": {"vx": 1}, "vx": {"x": -1, "vx": 0.8, "x^2 vx": -0.8}})
-    t = np.linspace(0, 20, 500)
-    runs = [(t, law.simulate(t, [start, 0.0])[:, :1]) for start in (0.5, 3.0)]
-    found = discover(runs, degree=1, order=2)
-    assert any("the curve misses the data of x" in warning for warning in found.warnings)
-
-
-def test_a_wrong_force_on_few_turns_is_not_taken_for_kicks_in_silence():
-    pull = Library.terms({"r/r^3": lambda x, y: np.array([x, y]) / np.hypot(x, y) ** 3})
-    law = PolynomialSystem.from_terms(
-        {
-            "x": {"vx": 1},
-            "y": {"vy": 1},
-            "vx": {"r/r^3_x": -1, "vx": -0.02},
-            "vy": {"r/r^3_y": -1, "vy": -0.02},
-        },
-        library=pull,
-    )
-    t = np.linspace(0, 20, 400)
-    x = law.simulate(t, [1, 0, 0, 1.15])[:, :2]
-    x += 0.014 * np.random.default_rng(0).normal(size=x.shape)
-    wrong = {
-        "r/r^4": lambda x, y: np.array([x, y]) / np.hypot(x, y) ** 4,
-        "r": lambda x, y: np.array([x, y]),
-    }
-    found = discover(t, x, order=2, library=Library.terms(wrong))
-    words = r"process noise, which 3\.\d turns of \d+ samples each cannot tell from a drive or a"
-    assert any(re.search(words, warning) for warning in found.warnings)
-
-
-def test_a_drive_that_nobody_named_is_a_misfit():
-    # x'' = -x + a cos 2.3 t: what the law misses is no function of the state, but has a period.
-    t = np.linspace(0, 100, 1500)
-    x = np.stack([np.cos(t) + 0.1 * np.cos(2.3 * t), -np.sin(t) - 0.23 * np.sin(2.3 * t)], axis=1)
-    found = discover(t, x + 0.02 * np.random.default_rng(3).standard_normal(x.shape), order=1)
-    first, *others = (warning[:26] for warning in found.warnings)
-    assert first == "the curve misses the data "
-    assert set(others) <= {"the last fit did not conve"}  # of a wrong law, on the way to another
-
-
-def test_what_a_law_misses_is_told_among_errors_that_last():
-    # A cubic for the sine of a pendulum: further terms follow what it leaves.
-    t = np.linspace(0, 120, 1800)
-    swing = runge_kutta_4(
-        lambda x: np.array([x[1], -np.sin(x[0]) - 0.02 * x[1]]), t, np.array([2.5, 0])
-    )
-    x = corruption.add_correlated_noise(swing, 0.03, np.random.default_rng(2))
-    found = discover(t, x, order=1)
-    assert any("times the noise estimated beforehand" in warning for warning in found.warnings)
-
-
 def test_random_pushes_that_nobody_named_are_a_misfit():
     # A spring swings where it is pushed: what its law misses comes back with the other sign.
-    t = np.linspace(0, 80, 1500)
+    t = np.linspace(0, 80, 800)
     rng = np.random.default_rng(1)
     push = make_interp_spline(np.linspace(-2, 82, 71), rng.standard_normal(71))
     swing = runge_kutta_4(
@@ -321,54 +221,33 @@ def test_random_pushes_that_nobody_named_are_a_misfit():
 # ------------------------------------------------------------------------------------ other origins
 
 
-def moved(flow, origin, error, draws):
-    """The law of a flow around an origin, and what is found in some draws of an error."""
+def moved(flow, origin, error, level, draw=0, n=1500):
+    """The law of a flow around an origin, and what is found in a draw of an error."""
     truth = FLOWS[flow].shift(origin)
-    t, x = truth.trajectory(1500)
-    rngs = map(np.random.default_rng, draws)
-    return truth, [discover(t, error(x, rng)) for rng in rngs]
+    t, x = truth.trajectory(n)
+    return truth, discover(t, error(x, level, np.random.default_rng(draw)))
 
 
-def test_axes_whose_origin_the_data_do_not_tell_share_a_line():
-    found = [("another origin", name, cost) for name, cost in (("x", 0.4), ("x", -0.2), ("z", 3))]
-    first, second = untold_origins([*found, ("the origin of the data", "y", 1)], "longer ones")
-    assert "origin is in x and in z: other terms around another origin" in first
-    assert "(criterion -0.2); use longer ones" in first
-    assert "origin is in y: other terms around the origin of the data" in second
-
-
-@pytest.mark.parametrize("place", [0.007, 0.0, -0.007])
+@pytest.mark.parametrize("place", [0.007, 0.0])
 def test_an_origin_a_little_off_that_of_the_data_is_told_where_errors_are_small(place):
     # Less than a hundredth of the spread: nothing at the errors that the search tolerates.
-    def rounded(x, rng):
-        return corruption.quantise(x, 1 / 64, rng)
-
-    truth, found = moved("WangSun", (place, -1.47, 1.87), rounded, range(2))
-    assert all(score(one, truth).exact for one in found)
-    assert [one.offset[0] != 0 for one in found] == [place != 0] * 2
+    truth, found = moved("WangSun", (place, -1.47, 1.87), corruption.quantise, 1 / 64)
+    assert score(found, truth).exact
+    assert (found.offset[0] != 0) == (place != 0)
 
 
 def test_an_axis_is_not_at_home_for_the_asking_where_others_have_left():
     # Around another origin of z than that of the data the same law has x in dy/dt.
-    def noisy(x, rng):
-        return corruption.add_noise(x, 0.2, rng)
-
-    truth, found = moved("Chen", (13.8, 9.0, 4.05), noisy, range(1, 5))
-    wrong = [one for one in found if not score(one, truth).exact]
-    assert wrong
-    assert all(one.warnings for one in wrong)
-    home = [" ".join(one.warnings) for one in wrong if one.offset[2] == 0]
-    assert home
-    assert all("the law's origin is in z: other terms around another" in text for text in home)
+    truth, found = moved("Chen", (13.8, 9.0, 4.05), add_noise, 0.2, 1)
+    assert not score(found, truth).exact
+    assert found.offset[2] == 0
+    told = " ".join(found.warnings)
+    assert "the law's origin is in z: other terms around another" in told
 
 
-@pytest.mark.parametrize("noise", [0.1, 0.2])
-def test_an_axis_at_home_that_the_data_hold_there_is_not_doubted(noise):
-    def noisy(x, rng):
-        return corruption.add_noise(x, noise, rng)
-
-    truth, found = moved("SprottE", (10.0, 10.0, 0.0), noisy, range(2))
-    assert [(score(one, truth).exact, one.status) for one in found] == [(True, "ok")] * 2
+def test_an_axis_at_home_that_the_data_hold_there_is_not_doubted():
+    truth, found = moved("SprottE", (10.0, 10.0, 0.0), add_noise, 0.2, n=1000)
+    assert (score(found, truth).exact, found.status) == (True, "ok")
 
 
 # ------------------------------------------------------------------------- terms beyond the library
@@ -387,53 +266,38 @@ def noisy(x, share, seed=0):
     return x + share * x.std() * np.random.default_rng(seed).standard_normal(x.shape)
 
 
-OUTSIDE = {
-    "sine": (lambda x, v: -9.81 * np.sin(x) - 0.2 * v, 1.6),
-    "rational": (lambda x, v: -3 * x / (1 + x**2) - 0.05 * v, 2.0),
-    "exponential": (lambda x, v: -2 * (1 - np.exp(-x)) * np.exp(-x) - 0.03 * v, 1.2),
-}
-INSIDE = {
-    "Duffing": (lambda x, v: x - x**3 - 0.1 * v, 1.5),
-    "Van der Pol": (lambda x, v: -x + 1.5 * (1 - x**2) * v, 0.5),
-    "spring": (lambda x, v: -4 * x - 0.1 * v, 1.5),
-}
-
-
 @pytest.mark.parametrize(
-    ("name", "share"), [("sine", 0.0), *((name, 0.01) for name in OUTSIDE), ("rational", 0.05)]
+    ("pull", "start", "share", "words"),
+    [
+        (lambda x, v: -9.81 * np.sin(x) - 0.2 * v, 1.6, 0.0, f"{WORDS} (x^5 in dvx/dt"),
+        (lambda x, v: -9.81 * np.sin(x) - 0.2 * v, 1.6, 0.01, WORDS),
+        (lambda x, v: -3 * x / (1 + x**2) - 0.05 * v, 2.0, 0.05, ""),
+    ],
 )
-def test_a_cubic_for_another_function_is_doubted(name, share):
-    found = discover(TIMES, noisy(swung(*OUTSIDE[name]), share), order=2)
-    assert found.status == "suspect"
-    if name == "sine":
-        said = [warning for warning in found.warnings if WORDS in warning]
-        assert said
-        assert share or "x^5 in dvx/dt" in said[0]  # with noise, chance has a say in which
+def test_a_cubic_for_another_function_is_doubted(pull, start, share, words):
+    found = discover(TIMES, noisy(swung(pull, start), share), order=2)
+    assert any(words in warning for warning in found.warnings)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.01, 0.05])
-@pytest.mark.parametrize("name", INSIDE)
-def test_a_true_law_is_not(name, share):
-    found = discover(TIMES, noisy(swung(*INSIDE[name]), share, seed=3), order=2)
+@pytest.mark.parametrize("share", [0.0, 0.05])
+def test_a_true_law_is_not(share):
+    x = swung(lambda x, v: -x + 1.5 * (1 - x**2) * v, 0.5)
+    found = discover(TIMES, noisy(x, share, seed=3), order=2)
     assert not any(WORDS in warning for warning in found.warnings)
 
 
-@pytest.mark.parametrize(("number", "status"), [(4, "suspect"), (13, "suspect"), (21, "suspect"),
-                                                (2, "ok"), (12, "ok"), (17, "ok")])  # fmt: skip
+@pytest.mark.parametrize(("number", "status"), [(4, "suspect"), (13, "suspect"), (12, "ok")])
 def test_a_way_to_rest_on_a_line_is_doubted_where_higher_terms_explain_what_is_left(number, status):
-    data = OdeContest(number).data()  # an exponential, a sine, a fraction; and three cubics
+    data = OdeContest(number).data()  # an exponential, a sine; and a cubic
     assert discover(data.t, data.x).status == status
 
 
-def test_many_terms_that_explain_all_are_no_reason_to_doubt():
+def test_how_much_further_terms_have_to_explain():
     few = Beyond(gain=9.5, count=2, best=0.1, tried=5, left=10.0, term="x^4 in dx/dt")
     assert few.decisive
     assert not replace(few, gain=8.5).decisive
     assert not replace(few, count=3).decisive  # ten errors that are left are many for two terms
-
-
-def test_one_term_that_explains_all_is_a_reason_where_chance_would_share_it_out():
-    one = Beyond(gain=0.0, count=0, best=9.5, tried=5, left=10.0, term="x^3 in dx/dt")
+    one = replace(few, gain=0.0, count=0, best=9.5)
     assert one.decisive
     assert not replace(one, best=8.9).decisive
     assert not replace(one, best=2.85, left=3.0).decisive  # of three errors one is often that large
@@ -453,12 +317,6 @@ def test_a_rival_of_higher_degree_is_told():
     assert "x^5" in " ".join(w for w in found.warnings if "another law may" in w)
 
 
-def test_a_polynomial_of_a_library_of_fractions_is_asked_for_more_as_well():
-    data = OdeContest(14, start=1).data()  # a fraction, too small to be seen where x is large
-    found = discover(data.t, data.x, library=Library.polynomial(3) + Library.rational(1))
-    assert any(WORDS in warning for warning in found.warnings)
-
-
 @pytest.mark.parametrize(("degree", "status"), [(1, "suspect"), (3, "ok")])
 def test_a_numerator_that_lacks_a_term_is_no_motion_that_is_kicked(degree, status):
     """Drag over 1 + x^2 needs x^2 vx there; without it, what is missed looks like kicks."""
@@ -475,24 +333,7 @@ def test_a_numerator_that_lacks_a_term_is_no_motion_that_is_kicked(degree, statu
 
 def test_a_function_that_is_a_monomial_is_no_rival_of_itself():
     pull = {"pull": lambda x: x, "slow": lambda vx: vx}
-    x = noisy(swung(INSIDE["spring"][0], 1.5), 0.02)
+    x = noisy(swung(lambda x, v: -4 * x - 0.1 * v, 1.5), 0.02)
     found = discover(TIMES, x, order=2, library=Library.terms(pull))
     assert found.system.text(1) == "x'' = -4 pull - 0.1 slow"
     assert found.status == "ok"
-
-
-def test_a_degree_that_is_too_low_is_told():
-    x = noisy(swung(lambda x, v: -4 * x - 0.2 * x**3 - 0.1 * v, 1.5), 0.01)
-    found = discover(TIMES, x, order=2, library=Library.polynomial(1))
-    assert any(WORDS in warning for warning in found.warnings)
-
-
-def test_the_wider_library_keeps_the_old_one_and_within_the_budget():
-    cubic = monomial_exponents(3, 3)
-    wide = _higher(cubic, 3, 1000)
-    assert (wide[: len(cubic)] == cubic).all()
-    assert len(wide) == len(monomial_exponents(3, 5))
-    pairs, single = _higher(cubic, 3, 30), _higher(cubic, 3, 6)
-    assert ((pairs[len(cubic) :] > 0).sum(axis=1) <= 2).all()
-    assert len(single) == len(cubic) + 6
-    assert _higher(cubic, 3, 5) is cubic

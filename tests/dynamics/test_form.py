@@ -1,12 +1,12 @@
-"""What a user knows of a law beforehand: terms, origin, errors, names, and what nobody saw."""
+"""What a user knows beforehand: terms, origin, errors, names, and what nobody saw."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import vidsindy_lite as vl
 from vidsindy_lite import Library, PolynomialSystem, study
 from vidsindy_lite.dynamics.model import Form
-from vidsindy_lite.dynamics.problem import pose
 
 SPRING = PolynomialSystem.from_terms({"x": {"y": 2}, "y": {"x": -1, "y": -0.1}}, degree=2)
 T = np.linspace(0, 20, 200)
@@ -38,6 +38,7 @@ def test_terms_are_known_forbidden_or_alone_allowed():
 def test_of_second_order_the_accelerations_are_given():
     posed = form(QUADRATIC.where({"vx": {"x": -4}}), order=2)
     assert posed.law(posed.known).text() == "x'' = -4 x\ny'' = 0"
+    assert form(QUADRATIC, order=2).movable.tolist() == [True, True, False, False]
     with pytest.raises(ValueError, match=r"library: must give terms of an equation of vx, vy, got"):
         form(QUADRATIC.where({"x": {"vx": 1}}), order=2)
 
@@ -79,7 +80,6 @@ def test_a_direction_of_a_vector_that_is_empty_is_no_term():
     [
         ({"z": {"x": 1}}, "library: must give terms of an equation of x, y, got 'z'"),
         ({"x": {"z": 1}}, "library: 'z' is no term of the equation of x, which has 1, x, y, x"),
-        ({"y": {"x^3": 0}}, "library: 'x\\^3' is no term of the equation of y, which has 1, x"),
         ({"x": {"...": 0}, "y": {"...": 0}}, "library: must leave a term to be found, got all"),
         ({"x": {"y": np.nan}}, "coefficient of y: must be a finite number, got nan"),
         ({"x": "y"}, "equations: must give variables what is known of their terms"),
@@ -130,35 +130,17 @@ def test_with_the_origin_of_the_data_no_axis_moves():
 # ---------------------------------------------------------------------------------- sigma
 
 
-def test_given_errors_are_scaled_and_relative():
-    sigma = np.where(T[:, None] < 10, 0.1, 0.4) * (1, 3)
-    problem = pose([(T, X)], [np.empty((*X.shape, 0))], form(QUADRATIC), np.random.default_rng(0),
-                   [sigma])  # fmt: skip
-    in_units = problem.noise * problem.units.scale / np.sqrt(problem.precision[0])
-    np.testing.assert_allclose(in_units, sigma, rtol=1e-12)
-
-
-@pytest.mark.parametrize("kind", ["growing", "unequal"])
-def test_error_bars_of_given_errors_cover(kind):
+def test_error_bars_of_given_errors_cover():
     allowed = {"x": {"y": None, "...": 0}, "y": {"x": None, "y": None, "...": 0}}
     library, scores = QUADRATIC.where(allowed), []
-    for seed in range(10):
+    for seed in range(6):
         rng = np.random.default_rng([7, seed])
-        uneven = np.where(rng.random(X.shape) < 0.3, 0.15, 0.02)
-        sigma = 0.01 + 0.08 * np.abs(X) if kind == "growing" else uneven
+        sigma = np.where(rng.random(X.shape) < 0.3, 0.15, 0.02)
         x = X + sigma * rng.normal(size=X.shape)
         found = vl.discover(T, x, library=library, sigma=sigma)
         away = (found.coefficients - SPRING.coefficients)[SPRING.support]
         scores += (away / found.standard_errors[SPRING.support]).tolist()
     assert 0.6 < np.std(scores) < 1.5
-
-
-def test_given_errors_are_worth_more_than_none():
-    rng = np.random.default_rng(3)
-    sigma = np.where(rng.random(X.shape) < 0.3, 0.3, 0.01)
-    x = X + sigma * rng.normal(size=X.shape)
-    told, untold = (vl.discover(T, x, degree=2, sigma=s).standard_errors for s in (sigma, None))
-    assert told[1, 1] < 0.5 * untold[1, 1]
 
 
 @pytest.mark.parametrize(("factor", "words"), [(0.4, "times sigma"), (2.5, "sigma of x is")])
@@ -170,54 +152,40 @@ def test_errors_that_contradict_the_data_are_doubted(factor, words):
 @pytest.mark.parametrize(
     ("sigma", "words"),
     [
-        (np.nan, "sigma: must be finite and positive where x is, got nan"),
         (0, "sigma: must be finite and positive where x is, got 0"),
-        ([0.1, -0.1], "sigma: must be finite and positive where x is, got -0.1"),
         ([0.1] * 3, r"sigma: must be a number, or have shape \(2,\) or \(200, 2\), got \(3,\)"),
-        ("small", "sigma: must be an array of real numbers, got 'small'"),
     ],
 )
 def test_errors_that_are_none(sigma, words):
     with pytest.raises(ValueError, match=words):
         vl.discover(T, X, sigma=sigma)
-
-
-def test_errors_of_several_trajectories():
-    runs = [(T[:120], noisy()[:120]), (T, SPRING.simulate(T, (0.0, 0.5)) + 0.02 * X[::-1])]
     with pytest.raises(ValueError, match=r"sigma: must be one per trajectory \(2\), got 3"):
-        vl.discover(runs, sigma=[0.1, 0.1, 0.1])
-    with pytest.raises(ValueError, match=r"or have shape \(2,\) or \(120, 2\), got \(200, 2\)"):
-        vl.discover(runs, sigma=np.ones((200, 2)))
+        vl.discover([(T, X), (T, X)], sigma=[0.1, 0.1, 0.1])
 
 
 # ---------------------------------------------------------------------------------- names
 
 
-class Frame:
-    """What a data frame has: columns, and an array."""
-
-    def __init__(self, values, columns):
-        self.values, self.columns, self.shape = values, columns, values.shape
-
-    def __array__(self, dtype=None, copy=None):
-        return self.values
+def frame(*names):
+    return pd.DataFrame(X, columns=names)
 
 
 def test_columns_name_the_variables():
-    found = vl.discover(T, Frame(X, ["hare", "lynx"]), degree=1)
+    found = vl.discover(T, frame("hare", "lynx"), degree=1)
     assert found.system.names == ("hare", "lynx")
     assert found.equations().startswith("dhare/dt = (2.0")
-    assert vl.discover(T, Frame(X, [0, 1]), degree=1).system.names == ("x", "y")
-    assert vl.discover(T, Frame(X, ["x / m", "y / m"]), degree=1).system.names == ("x", "y")
+    assert vl.discover(T, frame(0, 1), degree=1).system.names == ("x", "y")
+    odd = vl.discover(T, frame("x / m", "y / m"), degree=1)
+    assert odd.system.names == ("x", "y")
     with pytest.raises(ValueError, match="x: columns must be named alike in all trajectories"):
-        vl.discover([(T, Frame(X, ["a", "b"])), (T, Frame(X, ["b", "a"]))])
+        vl.discover([(T, frame("a", "b")), (T, frame("b", "a"))])
 
 
 # ------------------------------------------------------------------------------ what was never seen
 
 OSCILLATOR = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -4, "y": -0.1, "x^3": -1}})
 TIED = Library.polynomial(3).where({"x": {"y": 1, "...": 0}})
-LONG = np.linspace(0, 20, 1000)
+LONG = np.linspace(0, 20, 600)
 
 
 def without(x, column, noise=0.0):
@@ -227,9 +195,8 @@ def without(x, column, noise=0.0):
     return x
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.02])
-def test_a_velocity_that_nobody_saw(noise):
-    found = vl.discover(LONG, without(OSCILLATOR.simulate(LONG, [1.5, 0]), 1, noise), library=TIED)
+def test_a_velocity_that_nobody_saw():
+    found = vl.discover(LONG, without(OSCILLATOR.simulate(LONG, [1.5, 0]), 1, 0.02), library=TIED)
     assert study.score(found.system, OSCILLATOR).exact
     assert found.status == "ok"
     assert np.isnan(found.noise).tolist() == [False, True]
@@ -240,7 +207,7 @@ def test_a_coordinate_between_others_is_told_by_a_sum():
         {"x": {"x": -10, "y": 10}, "y": {"x": 28, "y": -1, "xz": -1}, "z": {"xy": 1, "z": -8 / 3}}
     )
     library = Library.polynomial(2).where({"x": {"x": -10, "y": 10, "...": 0}})
-    t = np.arange(1500) * 0.02
+    t = np.arange(800) * 0.02
     found = vl.discover(t, without(lorenz.simulate(t, [-8, 7, 27]), 1, 0.01), library=library)
     assert study.score(found.system, lorenz).exact
     errors = found.standard_errors
@@ -253,7 +220,6 @@ def test_a_coordinate_between_others_is_told_by_a_sum():
     [
         (Library.polynomial(3), 1, "told by an equation that is known, .* got none for y"),
         (Library.polynomial(3), 2, "order 2 every position must be seen, got none of y"),
-        (Library.polynomial(3).where({"y": {"x": 1, "...": 0}}), 1, "got none for y"),
         (Library.polynomial(3).where({"x": {"y^2": 1, "...": 0}}), 1, "got none for y"),
         (Library.polynomial(3).where({"x": {"y": 1, "xy": 1, "...": 0}}), 1, "got none for y"),
     ],
@@ -269,3 +235,63 @@ def test_seen_in_one_trajectory_and_not_in_another():
     x = OSCILLATOR.simulate(LONG, [1.5, 0])
     with pytest.raises(ValueError, match="in all trajectories or in none, got column 1 .* 1$"):
         vl.discover([(LONG, x), (LONG, without(x, 1))], library=TIED)
+
+
+# -------------------------------------------------------------------- errors that all samples share
+
+
+def distorted(name, seed, size):
+    """A clean trajectory seen through a slightly wrong linear map, and what the map may be."""
+    rng = np.random.default_rng(seed)
+    truth = study.SYSTEMS[name].shift((10, 10, 0))
+    t, x = truth.trajectory(300)
+    modes = size * np.einsum("kij,nj->kni", rng.normal(size=(4, 3, 3)), x - x.mean(axis=0))
+    noise = 1e-5 * x.std(axis=0) * rng.normal(size=x.shape)
+    return truth, t, x + np.tensordot(rng.normal(size=4), modes, 1) + noise, modes
+
+
+def test_a_slightly_wrong_map_costs_accuracy_unless_it_is_told():
+    truth, t, x, modes = distorted("SprottE", 0, 1e-4)
+    blind = study.score(vl.discover(t, x), truth)
+    told = vl.discover(t, x, systematic=modes)
+    assert blind.exact
+    assert study.score(told, truth).exact
+    assert study.score(told, truth).l2 < 0.2 * blind.l2  # no data tell of an error of scale
+    inside = truth.support
+    pulls = (told.coefficients - truth.coefficients)[inside] / told.standard_errors[inside]
+    assert np.sqrt(np.mean(pulls**2)) < 2.5
+    assert told.status == "ok"
+    x[100:104], modes[:, 100:104] = np.nan, np.nan
+    halves = [(t[:150], x[:150]), (t[150:], x[150:])]
+    parts = vl.discover(halves, systematic=[modes[:, :150], modes[:, 150:]])
+    assert study.score(parts, truth).exact
+
+
+def test_an_error_of_scale_changes_error_bars_alone():
+    """It is a share of the noise, too: as a change of the path it would explain that noise."""
+    law, error = study.SYSTEMS["RayleighBenard"], 3e-2
+    t, x = law.trajectory(600)
+    noisy = x + 0.004 * x.std(axis=0) * np.random.default_rng(0).standard_normal(x.shape)
+    plain, told = (vl.discover(t, noisy, systematic=e) for e in (None, error * noisy[None]))
+    assert study.score(told, law).exact
+    kept = plain.system.support
+    apart = (told.coefficients - plain.coefficients)[kept]
+    assert (np.abs(apart) < plain.standard_errors[kept]).all()
+    product = told.terms.index("xz"), 1
+    expected = error * abs(plain.coefficients[product])
+    assert told.standard_errors[product] == pytest.approx(expected, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    ("systematic", "message"),
+    [
+        (np.zeros((2, 9, 2)), r"systematic: must have shape \(k, 10, 2\), got \(2, 9, 2\)"),
+        (np.zeros((10, 2)), r"systematic: must have shape \(k, 10, 2\), got \(10, 2\)"),
+        (np.full((1, 10, 2), np.nan), "systematic: must be finite where x is"),
+        (-1, r"systematic: must have shape \(k, n, d\), got -1"),
+    ],
+)
+def test_malformed_systematic_errors_are_named(systematic, message):
+    t = np.arange(10.0)
+    with pytest.raises(ValueError, match=message):
+        vl.discover(t, np.column_stack((np.sin(t), np.cos(t))), 1, systematic=systematic)

@@ -12,7 +12,7 @@ from vidsindy_lite import Library, PolynomialSystem
 from vidsindy_lite.dynamics.library import Input, jumps
 from vidsindy_lite.dynamics.result import Discovery
 
-T = np.linspace(0, 40, 800)
+T = np.linspace(0, 40, 600)
 CUBIC = Library.polynomial(3)
 
 
@@ -40,8 +40,7 @@ def terms(law, equation):
     return {law.terms[k] for k in np.flatnonzero(column)}
 
 
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("noise", [0.0, 0.05])
+@pytest.mark.parametrize(("order", "noise"), [(1, 0.0), (2, 0.05)])
 def test_a_forced_oscillator_is_found_with_its_input_and_foretold(order, noise):
     x = noisy(FORCED[:, : 3 - order], noise)
     found = vl.discover(T, x, library=CUBIC + U, order=order)
@@ -56,30 +55,16 @@ def test_a_forced_oscillator_is_found_with_its_input_and_foretold(order, noise):
     assert r"\mathrm{u}" in law.latex()
 
 
-def test_the_origin_of_a_forced_law_is_found():
-    found = vl.discover(T, noisy(FORCED[:, :1], 0.01) + 2, library=CUBIC + U, order=2)
-    assert found.offset[0] == pytest.approx(2, abs=4 * found.offset_errors[0])
-    assert terms(found.native, "vx") == {"x", "vx", "x^3", "u"}
-    again = found.native.shift(found.offset)
-    np.testing.assert_allclose(again.coefficients, found.coefficients, atol=1e-9)
+@pytest.fixture(scope="module")
+def forced():
+    """What is found of the positions of the forced oscillator."""
+    return vl.discover(T, noisy(FORCED[:, :1], 0.01), library=CUBIC + U)
 
 
-def test_the_order_of_a_forced_law_is_decided():
-    found = vl.discover(T, noisy(FORCED[:, :1], 0.01), library=CUBIC + U)
-    assert (found.system.order, found.status) == (2, "ok")
+def test_the_order_of_a_forced_law_is_decided(forced):
+    assert (forced.system.order, forced.status) == (2, "ok")
     both = vl.discover(T, noisy(FORCED, 0.01), library=CUBIC + U)
     assert (both.system.order, both.status) == (1, "ok")
-
-
-def test_the_order_of_several_forced_coordinates_is_decided():
-    springs = solve_ivp(
-        lambda s, x: [x[2], x[3], -x[0] - 0.1 * x[2] + force(s), x[0] - 2 * x[1] - 0.1 * x[3]],
-        (0, 40), (0.5, 0.2, 0.0, 0.3), t_eval=T, rtol=1e-10, atol=1e-12,
-    ).y.T  # fmt: skip
-    found = vl.discover(T, noisy(springs[:, :2], 0.01), library=Library.polynomial(1) + U)
-    assert found.system.order == 2
-    assert terms(found.system, "vx") == {"x", "vx", "u"}
-    assert terms(found.system, "vy") == {"x", "y", "vy"}
 
 
 def test_functions_of_the_time_may_multiply_the_state():
@@ -106,24 +91,22 @@ def test_each_trajectory_has_its_input_and_a_gap_is_bridged():
     assert len(found.curves) == 2
 
 
-def test_a_law_with_an_input_is_saved_and_read_with_its_library(tmp_path):
-    found = vl.discover(T, noisy(FORCED[:, :1], 0.01), library=CUBIC + U, order=2)
-    found.save(tmp_path / "law.json")
+def test_a_law_with_an_input_is_saved_and_read_with_its_library(forced, tmp_path):
+    forced.save(tmp_path / "law.json")
     again = Discovery.load(tmp_path / "law.json", CUBIC + U)
     state = np.array([0.1, 0.2, 3.0])  # the time is the last
-    assert again.predict(state)[1] == found.predict(state)[1]
+    assert again.predict(state)[1] == forced.predict(state)[1]
     assert "changes with the time" in str(again.physics())
     with pytest.raises(ValueError, match="library: must hold the function 'u'"):
         Discovery.load(tmp_path / "law.json")
     with pytest.raises(ValueError, match=r"t: must lie where u is known, got 42"):
-        found.simulate((0, 0), np.linspace(30, 42, 5))
+        forced.simulate((0, 0), np.linspace(30, 42, 5))
 
 
-def test_slopes_are_refused_where_an_input_of_the_law_is_not_known():
-    found = vl.discover(T, noisy(FORCED[:, :1], 0.01), library=CUBIC + U, order=2)
+def test_slopes_are_refused_where_an_input_of_the_law_is_not_known(forced):
     for states in ([0.1, 0.2, 42.0], [[0.1, 0.2, 3.0], [0.1, 0.2, 42.0]]):
         with pytest.raises(ValueError, match=r"t: must lie where u is known, got 42"):
-            found.predict(states)
+            forced.predict(states)
     idle = Library.inputs(T, {"idle": np.cos(9.1 * T)})
     x = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1, "x^3": -1}}).simulate(T, (1, 0))
     free = vl.discover(T, noisy(x[:, :1], 0.01), library=CUBIC + idle, order=2)
@@ -152,14 +135,13 @@ CLOCK = np.arange(0, 40, 0.1)
 
 
 @pytest.mark.parametrize(
-    "known",
+    ("known", "noise"),
     [
-        Library.inputs(CLOCK, {"u": relay(CLOCK)}, hold="zero"),
-        Library.terms({"u": lambda t: relay(t).astype(float)}),
+        (Library.inputs(CLOCK, {"u": relay(CLOCK)}, hold="zero"), 0.0),
+        (Library.terms({"u": lambda t: relay(t).astype(float)}), 0.02),
     ],
     ids=["samples", "function"],
 )
-@pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_where_an_input_jumps_so_does_the_slope(known, noise):
     found = vl.discover(CLOCK, noisy(charged(), noise), library=Library.polynomial(1) + known)
     law = found.system
@@ -204,16 +186,12 @@ def test_an_input_is_a_spline_and_unknown_outside():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (lambda: Library.inputs(T, {"u": T[1:]}), r"u must have shape \(800,\), .* got \(799,\)"),
-        (lambda: Library.inputs(T, {"u": 1.0}), r"u must have shape \(800,\), .* got \(\)"),
+        (lambda: Library.inputs(T, {"u": T[1:]}), r"u must have shape \(600,\), .* got \(599,\)"),
         (
             lambda: Library.inputs(T, {"u": np.where(T > 3, np.nan, T)}),
             r"u must be finite, got NaN or infinity at t = 3\.0",
         ),
-        (lambda: Library.inputs(T, {}), "inputs: must map names to values"),
-        (lambda: Library.inputs([], {"u": []}), r"t: must hold at least one time.* got shape \(0,"),
         (lambda: Library.inputs(T, {"u v": T}), "inputs: must be named like variables.* got 'u v'"),
-        (lambda: Library.inputs(T, {1: T}), "inputs: must be named like variables.* got 1"),
         (lambda: Library.inputs([1.0], {"u": [1.0]}), "at least 2 samples, got 1"),
         (lambda: Library.inputs([T, T], {"u": [T]}), r"one per trajectory \(2\), got 1"),
         (lambda: Library.inputs([T, T], {"u": [T, T]}), "times apart .* to t = 40 and one from"),

@@ -1,16 +1,24 @@
-"""Sparse regression against brute force over all supports, and exact changes of frame."""
+"""Sparse regression, changes of frame, and what a law of a posed problem costs."""
 
 from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from helpers import posed
+from hypothesis import given
 from hypothesis import strategies as st
 
-from vidsindy_lite.dynamics import l0 as selection
-from vidsindy_lite.dynamics.frames import ShiftedLaw
+from vidsindy_lite.dynamics.collocation import Fit, State, Status
+from vidsindy_lite.dynamics.frames import ShiftedLaw, cheapest, closed
+from vidsindy_lite.dynamics.inference import _pruned
 from vidsindy_lite.dynamics.l0 import closest_rival, inverse, subset_path, subset_search
 from vidsindy_lite.dynamics.library import monomial_exponents
+from vidsindy_lite.dynamics.model import PolynomialSystem
+from vidsindy_lite.dynamics.problem import (
+    GAP,
+    OFFSET_PENALTY,
+    fit_curves,
+)
 from vidsindy_lite.study import SYSTEMS
 
 
@@ -21,35 +29,12 @@ def objective(information, pull, penalty, support):
     return penalty[inside].sum() - pull[inside] @ solution
 
 
-def brute_force(information, pull, penalty):
-    supports = [np.array(s, dtype=bool) for s in product([False, True], repeat=len(pull))]
-    values = [objective(information, pull, penalty, s) for s in supports]
-    best = int(np.argmin(values))
-    return supports[best], values[best]
-
-
 def random_problem(seed, m, rows=40):
     rng = np.random.default_rng(seed)
     matrix = rng.standard_normal((rows, m)) @ rng.standard_normal((m, m))
     truth = np.where(rng.random(m) < 0.5, rng.standard_normal(m), 0.0)
     target = matrix @ truth + 0.1 * rng.standard_normal(rows)
     return matrix.T @ matrix, matrix.T @ target, rng
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(1, 8), st.floats(0.01, 100), st.booleans())
-def test_without_correlation_the_search_finds_the_global_minimum(seed, m, price, full):
-    rng = np.random.default_rng(seed)
-    information = np.diag(10.0 ** rng.uniform(-3, 3, m))
-    pull = rng.standard_normal(m) * np.sqrt(np.diag(information))
-    penalty = price * rng.uniform(0.1, 1, m)
-    support, solution, value = subset_search(information, pull, 0 * pull, penalty, np.full(m, full))
-    expected, lowest = brute_force(information, pull, penalty)
-    # Every term decides for itself: no local minimum. Ties are a matter of rounding.
-    worth = pull**2 / np.diag(information)
-    assume((np.abs(worth - penalty) > 1e-6).all())
-    assert (support == expected).all()
-    assert value == pytest.approx(lowest, abs=1e-8)
-    np.testing.assert_allclose(solution, np.where(expected, pull / np.diag(information), 0.0))
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(2, 7), st.floats(0.01, 10))
@@ -70,39 +55,6 @@ def test_no_single_move_improves_the_result(seed, m, price):
             swapped = support.copy()
             swapped[[i, k]] = swapped[[k, i]]
             assert value <= objective(information, pull, penalty, swapped) + tolerance
-
-
-def test_a_swap_leaves_a_support_that_drops_and_adds_cannot():
-    # Column 2 alone explains the target; columns 0 and 2 are nearly the same.
-    rng = np.random.default_rng(0)
-    matrix = rng.standard_normal((100, 3))
-    matrix[:, 0] = matrix[:, 2] + 0.05 * rng.standard_normal(100)
-    pull, information = matrix.T @ matrix[:, 2], matrix.T @ matrix
-    start = np.array([True, False, False])
-    penalty = np.full(3, 1.0)
-    wrong = objective(information, pull, penalty, start)
-    assert objective(information, pull, penalty, [False, False, False]) > wrong
-    assert objective(information, pull, penalty, [True, False, True]) > wrong
-    support, solution, _ = subset_search(information, pull, 0 * pull, penalty, start)
-    assert list(support) == [False, False, True]
-    np.testing.assert_allclose(solution, [0, 0, 1], atol=1e-6)
-
-
-def circle(radius=1.0):
-    """Information and pull of 1, x, x^2, y^2, y for y - 10, on a circle around (10, 10)."""
-    angle = np.linspace(0, 6, 200)
-    x, y = 10 + radius * np.cos(angle), 10 + radius * np.sin(angle)
-    columns = np.stack([np.ones_like(x), x, x**2, y**2, y], axis=1)
-    weight = 1e8  # chi-square units: noise of 1e-4
-    return weight * columns.T @ columns, weight * columns.T @ (y - 10)
-
-
-def test_a_conserved_quantity_does_not_trap_the_search():
-    information, pull = circle()
-    start = np.array([True, True, True, True, False])
-    support, solution, _ = subset_search(information, pull, 0 * pull, np.full(5, 10.0), start)
-    assert support.tolist() == [True, False, False, False, True]
-    np.testing.assert_allclose(solution[[0, 4]], [-10, 1], rtol=1e-4)
 
 
 def test_the_closest_rival_may_have_no_term_in_common():
@@ -132,71 +84,25 @@ def test_a_path_is_a_search_of_each_share_that_begins_where_the_last_ended(seed,
         assert (found == support).all()
 
 
-@given(st.integers(0, 2**32 - 1))
-def test_scaling_a_column_scales_its_coefficient_and_changes_nothing_else(seed):
-    information, pull, rng = random_problem(seed, 5)
-    scale = 10.0 ** rng.uniform(-3, 3, 5)
-    penalty, start = np.ones(5), np.ones(5, dtype=bool)
-    support, solution, value = subset_search(information, pull, 0 * pull, penalty, start)
-    scaled = subset_search(
-        information * scale[:, None] * scale, pull * scale, 0 * pull, penalty, start
-    )
-    assert (scaled[0] == support).all()
-    np.testing.assert_allclose(scaled[1] * scale, solution, rtol=1e-5, atol=1e-8)
-    assert scaled[2] == pytest.approx(value, rel=1e-6)
-
-
 # -- information matrices ---
 
 
-def test_inverse_of_badly_scaled_information():
+def test_inverse_of_badly_scaled_and_of_no_information():
     scale = np.diag([1e-8, 1.0, 1e8])
     core = np.array([[2, 1, 0], [1, 2, 1], [0, 1, 2.0]])
     back = scale @ inverse(scale @ core @ scale) @ scale
     np.testing.assert_allclose(back, np.linalg.inv(core), atol=1e-11)
-
-
-def test_what_cannot_be_told_is_uncertain_not_certain():
-    dependent = np.array([[1.0, 1.0], [1.0, 1.0]])
-    assert np.diag(inverse(dependent)).min() > 1e6
-
-
-def test_no_information_is_a_huge_variance_not_an_overflow():
+    assert np.diag(inverse(np.ones((2, 2)))).min() > 1e6  # what cannot be told is uncertain
     with np.errstate(all="raise"):
         variance = np.diag(inverse(np.diag([4.0, 0.0])))
     assert variance[0] == pytest.approx(0.25)
     assert 1e200 < variance[1] < np.inf
 
 
-def test_a_search_ends_after_so_many_changes(monkeypatch):
-    rng = np.random.default_rng(0)
-    factor, truth = rng.normal(size=(40, 8)), np.array([3.0, -2, 4, 0, 1, 0, 5, -3])
-    information, penalty = factor.T @ factor, np.full(8, 0.1)
-    gradient, nothing = information @ truth, np.zeros(8, dtype=bool)
-    whole, *_ = subset_search(information, gradient, 0 * truth, penalty, nothing)
-    assert (whole == (truth != 0)).all()
-    monkeypatch.setattr(selection, "MOST_CHANGES", 0)
-    early, solution, _ = subset_search(information, gradient, 0 * truth, penalty, nothing)
-    assert not early.any()
-    assert not solution.any()
-
-
 # ------------------------------------------------------------------------------------------- frames
 
 
-def algebra(law, relative_error):
-    size = law.coefficients.size
-    return ShiftedLaw(law.exponents, law.coefficients, np.eye(size) / relative_error**2)
-
-
-def test_coefficients_in_another_frame_are_those_of_the_shift():
-    law = SYSTEMS["WangSun"]
-    origin = np.array([1.0, -2.0, 0.5])
-    coefficients, _, _ = algebra(law, 0.1).at(origin)
-    np.testing.assert_allclose(coefficients, law.shift(-origin).coefficients, atol=1e-12)
-
-
-def test_information_in_another_frame_keeps_the_quadratic_form():
+def test_another_frame_shifts_the_law_and_keeps_the_quadratic_form():
     rng = np.random.default_rng(0)
     exponents = monomial_exponents(2, 2)
     factor = rng.normal(size=(12, 12))
@@ -204,6 +110,8 @@ def test_information_in_another_frame_keeps_the_quadratic_form():
     delta = rng.normal(size=(6, 2))
     moved = ShiftedLaw(exponents, frames.coefficients + delta, frames.information)
     origin = np.array([0.3, -1.2])
+    law = PolynomialSystem(("x", "y"), exponents, frames.coefficients).shift(-origin)
+    np.testing.assert_allclose(frames.at(origin)[0], law.coefficients, atol=1e-12)
     difference = (moved.at(origin)[0] - frames.at(origin)[0]).T.ravel()
     expected = delta.T.ravel() @ frames.information @ delta.T.ravel()
     assert difference @ frames.at(origin)[1] @ difference == pytest.approx(expected)
@@ -211,10 +119,94 @@ def test_information_in_another_frame_keeps_the_quadratic_form():
 
 def test_coefficients_are_made_to_vanish():
     law = SYSTEMS["SprottF"].shift((0.4, -0.3, 0.2))
-    frames = algebra(law, 0.1)
+    frames = ShiftedLaw(law.exponents, law.coefficients, np.eye(law.coefficients.size))
     entries = np.argwhere((law.support & ~SYSTEMS["SprottF"].support).T)
     origin = frames.vanish(np.zeros((1, 3)), entries[None])[0]
     left = frames.at(origin)[0].T[tuple(entries.T)]
     np.testing.assert_allclose(left, 0, atol=1e-8)
     (moved,) = frames.vanish(np.array([[0.4, -0.3, 0.2]]), entries[None])
     np.testing.assert_allclose(moved, (0.4, -0.3, 0.2), atol=1e-12)
+
+
+# ---------------------------------------------------------------------------------- a posed problem
+
+
+@pytest.mark.parametrize("moving", [(False, False), (True, False)])
+def test_a_candidate_costs_its_misfit_its_terms_and_its_moved_axes(moving):
+    problem = posed(0.1)
+    collocation = problem.collocation(problem.segments())
+    linear = np.repeat(problem.exponents.sum(axis=1) <= 1, 2).reshape(-1, 2)
+    control, still = fit_curves(collocation, problem.curves), np.zeros(2, dtype=bool)
+    state = State(control, 0.1 * linear, linear, np.zeros(2), still)
+    whole = closed(problem, Fit(state, collocation, Status.CONVERGED), 1e2)
+    columns = np.flatnonzero(whole.state.free())
+    model = whole.collocation.linearise(whole.state, columns)
+    known, pull = np.diag(np.where(linear.T.ravel(), 0.0, 1e30)), np.zeros(12)
+    known[np.ix_(columns, columns)], pull[columns] = model.information, model.gradient
+    law = ShiftedLaw(problem.exponents, whole.state.coefficients, known, gradient=pull)
+    origin = np.where(moving, (0.3, -0.2), problem.origin)
+    candidate = cheapest(problem, whole, [(origin, np.array(moving))])
+
+    coefficients, information, gradient = law.at(origin)
+    step, penalties = np.linalg.solve(information, gradient), np.tile(problem.penalties, 2)
+    estimate = coefficients.T.ravel() + step
+    costs = {}
+    for support in product([False, True], repeat=6):
+        out = np.zeros(12, dtype=bool)
+        out[linear.T.ravel()] = ~np.array(support)
+        # The rest of the law gives way to what is taken out.
+        covariance = np.linalg.inv(information)[np.ix_(out, out)]
+        misfit = estimate[out] @ np.linalg.solve(covariance, estimate[out])
+        costs[tuple(out)] = misfit + penalties[linear.T.ravel() & ~out].sum()
+    out = np.array(min(costs, key=costs.__getitem__))
+    assert (candidate.state.active.T.ravel() == linear.T.ravel() & ~out).all()
+    price = sum(moving) * OFFSET_PENALTY * problem.penalties[0]
+    fitted = whole.collocation.objective(whole.state) - gradient @ step
+    expected = fitted + costs[tuple(out)] + price
+    assert candidate.criterion == pytest.approx(expected, rel=1e-9)
+    assert (candidate.state.moving == moving).all()
+    np.testing.assert_array_equal(candidate.state.offset, origin)
+
+
+# ----------------------------------------------------------------------------------- standard units
+
+
+def test_a_pause_is_a_gap_if_the_target_moves_far_in_it():
+    step = posed().units.time * GAP / 0.05  # samples in the longest pause that is none
+    for missing, stretches in ((int(step) - 2, 1), (int(step) + 2, 2)):
+        seen = np.r_[0:150, 150 + missing : 401]
+        assert len(posed(seen=seen).stretches) == stretches
+
+
+# ----------------------------------------------------------------- the law in the frame of the data
+
+
+def pruned(coefficients, covariance, penalties):
+    """A law of one variable around the data's own origin, pruned."""
+    law = np.array(coefficients, float)[:, None]
+    padded = np.pad(np.array(covariance, float), (0, 1))
+    return _pruned(monomial_exponents(1, len(law) - 1), law, np.zeros(1), padded, penalties)
+
+
+def test_pruning_conditions_on_zero():
+    kept, left = pruned([0.5, 20.0], [[1.0, 0.8], [0.8, 4.0]], np.array([9.0, 9.0]))
+    assert kept[0, 0] == 0
+    assert kept[1, 0] == pytest.approx(20.0 - 0.8 * 0.5)
+    assert left[1, 1] == pytest.approx(4.0 - 0.8**2)
+    assert not left[0].any()
+
+
+@pytest.mark.parametrize("distance", [0.3, 2.9, 3.1, 6.0])
+def test_the_square_of_an_origin_is_as_far_from_zero_as_the_origin(distance):
+    """x' = x^2 y around an origin that is so many standard errors from that of the data."""
+    exponents, error = monomial_exponents(2, 3), 1e-3
+    rows = exponents.tolist()
+    own, cross, square = (rows.index(powers) for powers in ([2, 1], [1, 1], [0, 1]))
+    law, offset = np.zeros((len(rows), 2)), np.array([distance * error, 0.0])
+    law[own, 0] = 1.0
+    covariance = np.zeros((law.size + 2,) * 2)
+    covariance[own, own], covariance[law.size, law.size] = 1e-8, error**2
+    kept, _ = _pruned(exponents, law, offset, covariance, np.full(law.size, 9.0))
+    assert kept[own, 0] == pytest.approx(1.0)
+    shifted = [0.0, 0.0] if distance < 3 else [-2 * offset[0], offset[0] ** 2]
+    assert kept[[cross, square], 0] == pytest.approx(shifted, abs=0.0)

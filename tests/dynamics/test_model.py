@@ -1,27 +1,21 @@
-"""Polynomial systems: terms, values, derivatives, exact shifts, text, and their paths."""
-
-import hashlib
-import os
-import subprocess
-import sys
-from pathlib import Path
+"""Polynomial systems: terms, values, derivatives, shifts, text, paths; and checked input."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import vidsindy_lite
-from vidsindy_lite.dynamics.data import variable_names
-from vidsindy_lite.dynamics.library import (
-    closure,
-    divides,
-    monomial_exponents,
-    monomials,
-    shift_generators,
-    shift_matrix,
+from vidsindy_lite.dynamics.data import (
+    check_trajectories,
+    check_trajectory,
+    cut,
+    typical_step,
+    variable_names,
 )
-from vidsindy_lite.dynamics.model import PolynomialSystem, integrate, runge_kutta_4, with_error
+from vidsindy_lite.dynamics.library import (
+    monomial_exponents,
+)
+from vidsindy_lite.dynamics.model import PolynomialSystem, integrate, runge_kutta_4
 
 LORENZ = {
     "x": {"x": -10, "y": 10},
@@ -39,21 +33,13 @@ def systems(draw):
     return PolynomialSystem(variable_names(d), exponents, sparse)
 
 
-def test_exponents_are_graded_and_complete():
-    assert monomial_exponents(2, 2).tolist() == [[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]]
-    assert len(monomial_exponents(3, 3)) == 20
-    assert len(np.unique(monomial_exponents(4, 3), axis=0)) == 35
-
-
 def test_terms_are_read_in_any_usual_spelling():
     spellings = ["x^2 y", "x*x*y", "yx**2", " x ^2*y "]
     laws = [PolynomialSystem.from_terms({"x": {s: 2.0}, "y": {}}, degree=3) for s in spellings]
     for law in laws:
         assert law.coefficients[law.terms.index("x^2y"), 0] == 2.0
         assert law.support.sum() == 1
-
-
-def test_long_names_are_kept_apart():
+    # Long names are kept apart.
     law = PolynomialSystem.from_terms({"x1": {"x1 x10": 1}, "x10": {"x10^2": -3}})
     assert law.terms[-3:] == ("x1^2", "x1 x10", "x10^2")
     assert "x_{10}" in law.latex()
@@ -63,13 +49,9 @@ def test_long_names_are_kept_apart():
     ("equations", "message"),
     [
         ({"x": {"q": 1}}, "term: must be a product"),
-        ({"x": {"x^": 1}}, "term: must be a product"),
         ({"x": {"x^4": 1}}, "degree: must be at least"),
         ({"x": {"": 1}}, "term: must be '1' or a product"),
-        ({"x": {2: 1}}, "term: must be '1' or a product .* got 2"),
-        ({"x": {"x": "a"}}, "coefficient of x: must be a finite number, got 'a'"),
         ({"x": 3}, "equations: must give each variable its terms, .* got {'x': 3}"),
-        (None, "equations: must give each variable its terms, .* got None"),
         ({}, "equations: must give each variable its terms, .* got {}"),
     ],
 )
@@ -86,25 +68,14 @@ def test_bad_terms_are_refused(equations, message):
         ((("x", "y"), [[1]], [[1]]), r"exponents: must have shape \(l, 2\), got shape \(1, 1\)"),
         ((("x",), [[-1]], [[1]]), "exponents: must be non-negative integers, got -1"),
         ((("x",), [[1.9]], [[1]]), "exponents: must be non-negative integers, got 1.9"),
-        ((("x",), [[np.nan]], [[1]]), "exponents: must be non-negative integers, got nan"),
-        ((("x",), [[1]], [[1j]]), "coefficients: must be an array of real numbers"),
         ((("x", "x"), [[1, 0]], [[1, 1]]), "names: must be distinct"),
-        ((("", "x"), [[1, 0]], [[1, 1]]), "names: must be distinct names such as x or x1"),
         ((("1", "x"), [[1, 0]], [[1, 1]]), "names: must be distinct names such as x or x1"),
-        ((None, [[1]], [[1]]), "names: must be a list, got None"),
         ((("x",), [[1]], [[1, 2]]), "coefficients: must have shape"),
     ],
 )
 def test_bad_systems_are_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         PolynomialSystem(*arguments)
-
-
-def test_value_is_the_formula():
-    law = PolynomialSystem.from_terms(LORENZ)
-    x, y, z = point = np.array([1.5, -2.0, 3.0])
-    np.testing.assert_allclose(law(point), [10 * (y - x), x * (28 - z) - y, x * y - 8 / 3 * z])
-    assert law(np.stack([point, point])).shape == (2, 3)
 
 
 @given(systems(), st.integers(0, 1000))
@@ -132,36 +103,12 @@ def test_shift_leaves_no_remainder_where_terms_cancel():
     assert shifted.coefficients[shifted.terms.index("1"), 0] == 0
 
 
-def test_generators_differentiate_monomials_and_shifts():
-    exponents = monomial_exponents(2, 3)
-    x, axis, step = np.array([[0.3, -1.2]]), np.array([0.0, 1e-6]), 1e-6
-    generator = shift_generators(exponents)[1]
-    slope = (monomials(x + axis, exponents) - monomials(x - axis, exponents)) / (2 * step)
-    np.testing.assert_allclose(monomials(x, exponents) @ generator, slope, atol=1e-8)
-    rate = (shift_matrix(exponents, axis) - shift_matrix(exponents, -axis)) / (2 * step)
-    np.testing.assert_allclose(rate, -generator, atol=1e-8)
-
-
-def test_closure_holds_all_divisors():
-    assert closure(np.array([[2, 0], [0, 1]])).tolist() == [[0, 0], [1, 0], [0, 1], [2, 0]]
-    exponents = monomial_exponents(2, 2)
-    support = np.zeros((6, 2), dtype=bool)
-    support[4, 1] = True  # xy in the second equation
-    widened = divides(exponents) @ support
-    assert widened[:, 1].tolist() == [True, True, True, False, True, False]
-    assert not widened[:, 0].any()
-
-
 @pytest.mark.parametrize(
     ("t", "x0", "message"),
     [
         ([0, 0], [1], "t: must increase"),
-        ([], [1], "t: must hold at least one time"),
-        (3, [1], "t: must hold at least one time"),
         ([0, np.inf], [1], "t: must be finite, got inf"),
-        ([0, np.nan, 1], [1], "t: must be finite, got nan"),
         ([0, 1], [1, 2], "x0: must be 1 finite numbers"),
-        ([0, 1], [np.nan], "x0: must be 1 finite numbers"),
     ],
 )
 def test_bad_simulations_are_refused(t, x0, message):
@@ -169,7 +116,11 @@ def test_bad_simulations_are_refused(t, x0, message):
         PolynomialSystem.from_terms({"x": {"x": 1}}).simulate(t, x0)
 
 
-def test_text_and_latex():
+def test_value_text_and_latex():
+    lorenz = PolynomialSystem.from_terms(LORENZ)
+    x, y, z = point = np.array([1.5, -2.0, 3.0])
+    np.testing.assert_allclose(lorenz(point), [10 * (y - x), x * (28 - z) - y, x * y - 8 / 3 * z])
+    assert lorenz(np.stack([point, point])).shape == (2, 3)
     law = PolynomialSystem.from_terms({"x": {"1": -0.5, "x": 1, "x^2y": -2.25}, "y": {}})
     assert law.text() == "dx/dt = x - 2.25 x^2y - 0.5\ndy/dt = 0"
     assert r"\dot{x} &= x - 2.25\,x^{2} y - 0.5" in law.latex()
@@ -187,30 +138,7 @@ def test_wrong_shapes_are_named():
             use("abc")
 
 
-@pytest.mark.parametrize("degree", [-1, 2.5, 2.0, True, "3", None])
-def test_degrees_are_whole_numbers(degree):
-    with pytest.raises(ValueError, match="degree: must be an integer of at least 0, got"):
-        monomial_exponents(2, degree)
-    if degree is not None:
-        with pytest.raises(ValueError, match="degree: must be"):
-            PolynomialSystem.from_terms({"x": {"1": 1}}, degree=degree)
-
-
-@pytest.mark.parametrize(
-    ("largest", "power"),
-    [(0.0, 0), (1.5, 0), (9.9e5, 0), (1.5e6, 6), (1.5e-5, 0), (9.9e-6, -6), (2e-300, -300)],
-)
-def test_numbers_of_many_digits_are_printed_with_a_power_of_ten(largest, power):
-    assert with_error(np.array(largest), 0.0)[1] == power
-
-
 # -------------------------------------------------------------------------------------------- paths
-
-DIGEST = """
-import hashlib
-from vidsindy_lite.study import SYSTEMS
-print(hashlib.sha256(SYSTEMS["SprottF"].trajectory(800)[1].tobytes()).hexdigest())
-"""
 
 
 def circle(x):
@@ -228,21 +156,25 @@ def test_the_tolerance_is_met():
     t = np.linspace(0, 10, 11)
     errors = [
         np.abs(integrate(circle, t, np.array([0.0, 1.0]), tolerance)[0][:, 0] - np.sin(t)).max()
-        for tolerance in (1e-5, 1e-8, 1e-11)
+        for tolerance in (1e-5, 1e-11)
     ]
-    assert errors[0] < 1e-3
-    assert errors[1] < 1e-6
-    assert errors[2] < 1e-9
-    assert errors[0] > errors[1] > errors[2] > 0
+    assert 1e-3 > errors[0] > 1e-8
+    assert 1e-9 > errors[1] > 0
 
 
-def test_after_a_blow_up_there_is_nothing():
+def test_what_ends_a_path_is_told_and_after_it_there_is_nothing():
     t = np.linspace(0, 2, 21)  # 1 / (1 - t)
-    path = integrate(lambda x: x**2, t, np.array([1.0]), farthest=1e6)[0][:, 0]
-    np.testing.assert_allclose(path[:10], 1 / (1 - t[:10]), rtol=1e-9)
+    path, end = integrate(lambda x: x**2, t, np.array([1.0]), farthest=1e6)
+    np.testing.assert_allclose(path[:10, 0], 1 / (1 - t[:10]), rtol=1e-9)
     assert np.isnan(path[10:]).all()
-    endless = integrate(lambda x: x**2, t, np.array([1.0]))[0][:, 0]
+    assert end == "diverges"
+    endless, end = integrate(lambda x: x**2, t, np.array([1.0]))
     assert np.isnan(endless[11:]).all()
+    assert end == "diverges"
+    path, end = integrate(lambda x: -1e6 * (x - 1), 10 * t, np.zeros(1), most_steps=200)
+    assert np.isfinite(path[0]).all()
+    assert np.isnan(path[-1]).all()
+    assert end == "is too stiff to be followed"
 
 
 def test_the_classical_method_is_of_fourth_order():
@@ -254,42 +186,79 @@ def test_the_classical_method_is_of_fourth_order():
     assert coarse / fine == pytest.approx(16, rel=0.1)
 
 
-def test_a_chaotic_path_is_the_same_with_every_kernel_of_linear_algebra():
-    """With scipy's integrator the end of this path moved by its whole width."""
-
-    def digest(**environment):
-        paths = {"PYTHONPATH": str(Path(vidsindy_lite.__file__).parents[1])}
-        ran = subprocess.run(
-            [sys.executable, "-c", DIGEST], env=os.environ | paths | environment,
-            capture_output=True, text=True, check=True,
-        )  # fmt: skip
-        return ran.stdout
-
-    here = digest()
-    assert len(here.strip()) == len(hashlib.sha256().hexdigest())
-    assert digest(OPENBLAS_CORETYPE="Haswell", OMP_NUM_THREADS="2") == here
-
-
-def test_a_motion_too_stiff_to_follow_ends():
-    t = np.linspace(0.0, 20.0, 50)
-
-    def rate(x):
-        return -1e6 * (x - 1)
-
-    path, _ = integrate(rate, t, np.array([0.0]), most_steps=200)
-    assert np.isfinite(path[0]).all()
-    assert np.isnan(path[-1]).all()
-
-
 def test_a_long_motion_is_followed_to_its_end():
     path, end = integrate(circle, np.array([0.0, 600.0]), np.array([0.0, 1.0]), most_steps=200)
     np.testing.assert_allclose(path[-1], [np.sin(600.0), np.cos(600.0)], atol=1e-6)
     assert end == ""
 
 
-def test_what_ends_a_path_is_told():
-    t = np.linspace(0.0, 20.0, 50)
-    assert integrate(lambda x: x**2, t, np.ones(1), farthest=1e6)[1] == "diverges"
-    assert integrate(lambda x: x**2, t, np.ones(1))[1] == "diverges"
-    stiff = integrate(lambda x: -1e6 * (x - 1), t, np.zeros(1), most_steps=200)
-    assert stiff[1] == "is too stiff to be followed"
+# -------------------------------------------------------------------------------------------- input
+
+T, X = np.arange(5.0), np.ones((5, 2))
+
+
+def with_value(row, value):
+    x = X.copy()
+    x[row, 1] = value
+    return x
+
+
+@pytest.mark.parametrize(
+    ("t", "x", "message"),
+    [
+        ("soon", X, "t: must be an array of real numbers, got 'soon'"),
+        (T, X + 0j, "x: must be an array of real numbers"),
+        (T, np.ones(5), r"x: must have shape \(n, d\)"),
+        (T[:4], X, r"t: must have shape \(5,\) as x has 5 rows, got \(4,\)"),
+        (np.array([0, 1, 1, 3, 4]), X, r"t: must increase, got t\[1\] = 1 before t\[2\] = 1"),
+        (T, with_value(3, np.inf), "x: must not be infinite .* got infinity in row 3"),
+        (T, with_value(3, -1e150), r"x: must be at most 1e\+100, got 1e\+150: take another unit"),
+        (T, np.diag(np.full(5, np.nan)) + 1, "x: must hold at least one row without NaN, got 5"),
+        (T, np.full((5, 2), np.nan), "x: must hold a number, got 5 rows of NaN"),
+    ],
+)
+def test_bad_input_is_named(t, x, message):
+    with pytest.raises(ValueError, match=message):
+        check_trajectory(t, x)
+
+
+def test_missing_and_masked_rows_are_left_out():
+    masked = np.ma.masked_greater(with_value(2, 1e9), 9)
+    for states in (with_value(2, np.nan), masked):
+        t, x = check_trajectory(T, states)
+        assert t.tolist() == [0, 1, 3, 4]
+        assert (x == X[:4]).all()
+
+
+@pytest.mark.parametrize("t", [[1, 2], T, (T, X), [(T, X, X)], None])
+def test_what_is_no_list_of_trajectories(t):
+    with pytest.raises(ValueError, match=r"x: must be given, unless t is a list of pairs \(t, x\)"):
+        check_trajectories(t)
+
+
+@pytest.mark.parametrize("pairs", [[], [(T, X), (T, X[:, :1])]])
+def test_trajectories_of_one_system(pairs):
+    with pytest.raises(ValueError, match="t: a list of trajectories must hold at least one, all"):
+        check_trajectories(pairs)
+
+
+def test_rows_of_several_trajectories_count_for_what_was_seen_in_them():
+    x = with_value(2, np.nan)
+    x[3] = np.nan
+    ((t, left),) = check_trajectories(T, x)
+    assert t.tolist() == [0, 1, 2, 4]
+    assert np.isnan(left[2]).tolist() == [False, True]
+
+
+def test_a_coordinate_that_pauses_cuts():
+    t = np.arange(10.0)
+    x = np.stack([t, np.where((t > 1) & (t < 6), np.nan, t)], axis=1)
+    assert [piece[0].tolist() for piece in cut((t, x), 2.5)] == [[0, 1], [6, 7, 8, 9]]
+    assert [piece[0].tolist() for piece in cut((t, x), np.array([2.5, 5]))] == [t.tolist()]
+
+
+def test_cut_at_long_steps_and_nowhere_else():
+    t = np.array([0.0, 1, 2, 5, 6, 9])
+    pieces = cut((t, t[:, None]), longest_step=2.0)
+    assert [piece[0].tolist() for piece in pieces] == [[0, 1, 2], [5, 6], [9]]
+    assert typical_step(pieces) == 1.0

@@ -8,17 +8,15 @@ import vidsindy_lite as vl
 from vidsindy_lite.dynamics.l0 import inverse
 from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.orientation import (
-    _turns,
     apart,
     in_axes,
-    turned,
     with_turns,
 )
 from vidsindy_lite.dynamics.solver import _solved, _Task
 from vidsindy_lite.study import SYSTEMS
 
 
-def askew(name, seed, noise=0.0, n=600):
+def askew(name, seed, noise=0.0, n=350):
     """A path in axes turned at random: times, places, and the law's axes in those."""
     t, x = SYSTEMS[name].trajectory(n, 50)
     rng = np.random.default_rng(seed)
@@ -26,24 +24,22 @@ def askew(name, seed, noise=0.0, n=600):
     return t, x @ turn.T + noise * x.std() * rng.normal(size=x.shape), turn.T
 
 
-@pytest.fixture(scope="module")
-def lorenz():
+def test_a_turned_law_is_found_in_its_own_axes(tmp_path):
     t, x, axes = askew("Lorenz", 1, 0.01)
-    return t, x, axes, vl.discover(t, x, degree=2, order=1, orientation="learn")
-
-
-def test_a_turned_law_is_found_in_its_own_axes(lorenz):
-    t, x, axes, found = lorenz
+    found = vl.discover(t, x, degree=2, order=1, orientation="learn")
     assert found.status == "ok"
     assert found.native.support.sum() == 7
     assert apart(found.orientation, axes) < np.deg2rad(1)
     np.testing.assert_allclose(found.orientation @ found.orientation.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(found.orientation) > 0
-    assert vl.discover(t, x, degree=2, order=1).native.support.sum() > 7  # in the axes of the data
-
-
-def test_its_curve_is_in_its_own_axes_and_it_is_kept(lorenz, tmp_path):
-    t, x, _, found = lorenz
+    turn = np.rint(found.orientation @ axes.T)  # which of the law's axes they are
+    y, law = 10 * np.random.default_rng(1).normal(size=(50, 3)), SYSTEMS["Lorenz"]
+    truth = np.linalg.lstsq(found.system.library(y), law(y @ turn) @ turn.T)[0]
+    wanted = np.abs(truth) > 1e-6
+    np.testing.assert_array_equal(found.system.support, wanted)
+    pulls = np.abs((found.coefficients - truth)[wanted] / found.standard_errors[wanted])
+    assert (pulls < 3).all()
+    # Its curve is in its own axes, and they are kept.
     missed = found.curve(t) @ found.orientation - x
     assert np.sqrt(np.mean(missed**2)) < 0.02 * x.std()
     assert "axes: turned, x along (" in str(found)
@@ -54,20 +50,11 @@ def test_its_curve_is_in_its_own_axes_and_it_is_kept(lorenz, tmp_path):
     )
 
 
-def test_a_turn_of_the_data_changes_nothing_in_the_law(lorenz):
-    t, x, axes, found = lorenz
-    more = Rotation.from_rotvec([0.3, -0.9, 0.4]).as_matrix()
-    again = vl.discover(t, x @ more.T, degree=2, order=1, orientation="learn")
-    sizes = [np.sort(np.abs(law.native.coefficients[law.native.support])) for law in (found, again)]
-    np.testing.assert_allclose(*sizes, rtol=0.02)
-    assert apart(again.orientation, found.orientation @ more.T) < np.deg2rad(0.3)
-
-
 def test_springs_that_stand_askew_are_found_along_themselves():
     names = {"x": "vx", "y": "vy", "z": "vz"}
     springs = {f"v{name}": {name: -k} for name, k in zip(names, (1.0, 1.7, 2.3), strict=True)}
     law = vl.PolynomialSystem.from_terms({n: {v: 1} for n, v in names.items()} | springs)
-    t, rng = np.linspace(0, 40, 800), np.random.default_rng(0)
+    t, rng = np.linspace(0, 30, 500), np.random.default_rng(0)
     x = law.simulate(t, [1, 0.2, 0.5, 0.1, 0.8, -0.5])[:, :3]
     axes = Rotation.random(random_state=rng).as_matrix()
     seen = x @ axes + 0.02 * x.std() * rng.normal(size=x.shape)
@@ -102,23 +89,6 @@ def own_errors(fit, model):
     return np.sqrt(np.diag(inverse(model.of(np.flatnonzero(fit.state.free())).information)))
 
 
-def test_what_a_small_turn_changes_is_what_is_left_of_turned_laws():
-    _, problem, fit = solved(DUFFING, 3, [1.5, 0.4])
-    law, units, step = problem.law(fit.state), problem.units, 1e-5
-    y = np.random.default_rng(1).normal(size=(50, 2))  # standard points, from the law's own origin
-
-    def slopes(angle):
-        turn = turned(np.array([angle]), 2)
-        inward = (turn.T @ units.point(y + fit.state.offset).T).T
-        return law(units.standard(inward) - fit.state.offset) * units.scale @ turn.T / units.scale
-
-    change = _turns(problem, fit.state)[: law.coefficients.size, 0].reshape(2, -1).T
-    expected = (slopes(step) - slopes(-step)) / (2 * step)
-    found = law.library(y) @ change
-    sign = np.sign(np.sum(found * expected))  # which way is positive does not matter
-    np.testing.assert_allclose(sign * found, expected, atol=1e-6 * np.abs(expected).max())
-
-
 def test_axes_that_are_not_known_make_errors_larger():
     found, problem, fit = solved(LORENZ, 2, [-8.0, 7.0, 27.0], span=10)
     assert found.native.support.sum() == 7
@@ -132,23 +102,6 @@ def test_axes_that_the_terms_leave_open_are_a_choice_and_no_error():
     assert found.native.support.sum() == 4
     known, learned = own_errors(fit, problem.model(fit)), own_errors(fit, with_turns(problem, fit))
     np.testing.assert_allclose(learned, known, rtol=1e-6)
-
-
-@pytest.mark.slow
-def test_error_bars_of_a_turned_law_are_honest():
-    """95 % intervals of its coefficients hold the truth nine times in ten."""
-    law, pulls = SYSTEMS["Lorenz"], []
-    for seed in range(4):
-        t, x, axes = askew("Lorenz", seed, 0.01)
-        found = vl.discover(t, x, degree=2, order=1, orientation="learn")
-        turn = np.rint(found.orientation @ axes.T)  # which of the law's axes they are
-        y = 10 * np.random.default_rng(seed).normal(size=(50, 3))
-        truth = np.linalg.lstsq(found.system.library(y), law(y @ turn) @ turn.T)[0]
-        wanted = np.abs(truth) > 1e-6
-        np.testing.assert_array_equal(found.system.support, wanted)
-        missed = (found.coefficients - truth)[wanted]
-        pulls += np.abs(missed / found.standard_errors[wanted]).tolist()
-    assert np.mean(np.array(pulls) < 1.96) >= 0.9
 
 
 def test_where_no_axes_are_better_those_of_the_data_stay():
@@ -167,7 +120,6 @@ def test_where_no_axes_are_better_those_of_the_data_stay():
         ({"orientation": "mine"}, "orientation: must be one of data, learn, got 'mine'"),
         ({"library": vl.Library.fourier(1)}, "orientation: can be learned only among all"),
         ({"origin": "data"}, "orientation: can be learned only with origin='learn', got 'data'"),
-        ({"width": 1}, "orientation: can be learned of two or three coordinates, got 1"),
         ({"width": 4}, "orientation: can be learned of two or three coordinates, got 4"),
     ],
 )

@@ -1,5 +1,11 @@
 """Discovery: exact recovery, its uncertainty, its warnings, bad input, threads."""
 
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
 from threading import Barrier, Thread
 
 import numpy as np
@@ -8,13 +14,13 @@ from scipy.stats import kstest
 from threadpoolctl import threadpool_info, threadpool_limits
 from tqdm import tqdm
 
+import vidsindy_lite
 from vidsindy_lite.dynamics import solver
 from vidsindy_lite.dynamics.model import PolynomialSystem
 from vidsindy_lite.dynamics.solver import discover, one_blas_thread
 from vidsindy_lite.study import (
     REFERENCE_OFFSET,
     SYSTEMS,
-    FlowContest,
     add_noise,
     drop_fibers,
     score,
@@ -27,17 +33,9 @@ def measured(name, noise, n=600, seed=11):
     return truth, t, add_noise(x, noise, np.random.default_rng(seed))
 
 
-@pytest.fixture(scope="module")
-def lorenz():
-    """What is found in noisy samples of Lorenz: the truth, the samples, the discovery."""
-    truth, t, x = measured("Lorenz", 0.05)
-    return truth, t, x, discover(t, x)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_clean_systems_are_recovered_exactly(name):
-    truth, t, x = measured(name, 0.0)
+    truth, t, x = measured(name, 0.0, n=400)
     found = discover(t, x)
     result = score(found, truth)
     assert result.exact
@@ -47,15 +45,12 @@ def test_clean_systems_are_recovered_exactly(name):
     assert found.status == "ok"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["SprottE", "NoseHoover", "WangSun"])
+@pytest.mark.parametrize("name", ["SprottE", "WangSun"])
 def test_noisy_systems_are_recovered(name):
-    truth, t, x = measured(name, 0.1, n=1000)
+    truth, t, x = measured(name, 0.1, n=700)
     found = discover(t, x)
     assert score(found, truth).exact
-    np.testing.assert_allclose(
-        found.noise, 0.1 * np.std(truth.trajectory(1000)[1], axis=0), rtol=0.1
-    )
+    np.testing.assert_allclose(found.noise, 0.1 * truth.trajectory(700)[1].std(axis=0), rtol=0.1)
 
 
 PLANAR = {
@@ -95,33 +90,15 @@ TIED = {  # what is conserved ties the candidates together along the trajectory
 
 
 @pytest.mark.parametrize("name", TIED)
-@pytest.mark.parametrize("noise", [0.0, pytest.param(0.01, marks=pytest.mark.slow)])
-def test_conserved_quantities_do_not_hide_the_law(name, noise):
+def test_conserved_quantities_do_not_hide_the_law(name):
     terms, offset, x0, duration, degree = TIED[name]
     truth = PolynomialSystem.from_terms(terms).shift(offset)
-    t = np.linspace(0, duration, 600)
-    x = add_noise(truth.simulate(t, x0), noise, np.random.default_rng(1))
-    assert score(discover(t, x, degree=degree), truth).exact
+    t = np.linspace(0, duration, 400)
+    assert score(discover(t, truth.simulate(t, x0), degree=degree), truth).exact
 
 
-def test_four_dimensions():
-    truth = PolynomialSystem.from_terms(
-        {
-            "x": {"y": 1},
-            "y": {"x": -1, "z": 0.3},
-            "z": {"w": 1},
-            "w": {"z": -2, "x": 0.3, "z^2": -0.4},
-        }
-    )
-    t = np.linspace(0, 40, 800)
-    x = truth.simulate(t, (1, 0, 0.5, 0))
-    found = discover(t, add_noise(x, 0.01, np.random.default_rng(0)), degree=2)
-    assert score(found, truth).exact
-
-
-@pytest.mark.slow
 def test_gaps_are_bridged():
-    truth, t, x = measured("Lorenz", 0.01, n=1000)
+    truth, t, x = measured("Lorenz", 0.01, n=700)
     found = discover(t, drop_fibers(x, 0.2, np.random.default_rng(4)))
     assert score(found, truth).exact
     assert len(found.curves) == 1
@@ -137,10 +114,11 @@ def test_a_gap_in_which_the_target_was_kicked_stays_open(kick, bridges):
     assert len(found.curves) == (1 if bridges else 2)
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.02])
-@pytest.mark.parametrize("missing", ["a third of all entries", "nine of ten of a coordinate"])
+@pytest.mark.parametrize(
+    ("missing", "noise"), [("a third of all entries", 0.02), ("nine of ten of a coordinate", 0.0)]
+)
 def test_what_was_seen_in_a_row_counts(missing, noise):
-    truth, t, x = measured("Lorenz", noise, n=1500)
+    truth, t, x = measured("Lorenz", noise, n=800)
     if missing == "a third of all entries":
         x[np.random.default_rng(8).random(x.shape) < 1 / 3] = np.nan
     else:
@@ -152,7 +130,6 @@ def test_what_was_seen_in_a_row_counts(missing, noise):
     assert found.status == "ok"
 
 
-@pytest.mark.slow
 def test_several_trajectories_share_one_law():
     truth = SYSTEMS["Lorenz"]
     rng = np.random.default_rng(3)
@@ -163,9 +140,8 @@ def test_several_trajectories_share_one_law():
     assert len(found.curves) == 3
 
 
-@pytest.mark.slow
 def test_units_do_not_matter():
-    truth, t, x = measured("SprottE", 0.05)
+    truth, t, x = measured("SprottE", 0.05, n=400)
     found = discover(t, x)
     scaled = discover(3600 * t, 1e-3 * x)
     assert (scaled.coefficients != 0).tolist() == (found.coefficients != 0).tolist()
@@ -174,47 +150,39 @@ def test_units_do_not_matter():
     np.testing.assert_allclose(scaled.standard_errors, found.standard_errors * factor, rtol=1e-4)
 
 
-def test_curve_follows_the_truth_better_than_the_data(lorenz):
-    truth, t, x, found = lorenz
-    clean = truth.trajectory(600)[1]
+def test_curve_follows_the_truth_better_than_the_data_and_equal_seeds_give_equal_results():
+    truth, t, x = measured("Lorenz", 0.05, n=400)
+    found, again = (discover(t, x, seed=5, time_limit=limit) for limit in (None, 1e9))
+    assert (found.coefficients == again.coefficients).all()
+    assert (found.covariance == again.covariance).all()
+    assert not any("time limit" in text for text in again.warnings)
+    clean = truth.trajectory(400)[1]
     fitted = found.curve(t)
     assert np.sqrt(np.mean((fitted - clean) ** 2)) < 0.3 * np.sqrt(np.mean((x - clean) ** 2))
     assert np.isnan(found.curve(np.array([t[-1] + 1]))).all()
 
 
-@pytest.mark.slow
 def test_standard_errors_are_calibrated():
     truth = PolynomialSystem.from_terms(PLANAR["oscillator"][0], degree=3)
-    t = np.linspace(0, 25, 300)
+    t = np.linspace(0, 25, 200)
     x = truth.simulate(t, (0.5, 0))
     scores = []
-    for seed in range(16):
+    for seed in range(8):
         found = discover(t, add_noise(x, 0.05, np.random.default_rng(seed)))
         error = found.coefficients - truth.coefficients
         if score(found, truth).exact:  # a false term every hundred draws is within the design
             scores.append(
                 (error / np.where(truth.support, found.standard_errors, 1))[truth.support]
             )
-    assert len(scores) >= 15
+    assert len(scores) >= 7
     assert kstest(np.concatenate(scores), "norm").pvalue > 1e-3
-
-
-def test_same_seed_same_result():
-    _, t, x = measured("NoseHoover", 0.1, n=400)
-    first, second = discover(t, x, seed=5), discover(t, x, seed=5)
-    assert (first.coefficients == second.coefficients).all()
-    assert (first.covariance == second.covariance).all()
 
 
 @pytest.mark.parametrize("persists", [True, False])
 def test_the_progress_bar_knows_its_end(monkeypatch, persists):
-    bars, shown = [], []
+    bars = []
 
     class Bar(tqdm):
-        def update(self, n=1):
-            super().update(n)
-            shown.append((self.n, self.total))
-
         def close(self):
             bars.append((self.n, self.total))
             super().close()
@@ -225,15 +193,7 @@ def test_the_progress_bar_knows_its_end(monkeypatch, persists):
     t = np.linspace(0, 12, 200)
     discover(t, np.stack([np.sin(t), np.cos(t)], axis=1), degree=1, progress=True)
     end = solver.MOST_LAWS * (1 + solver.ROUNDS)
-    assert all(n <= total == end for n, total in shown)
     assert bars[0] == (end, end)
-
-
-def test_a_time_limit_ends_the_rounds_and_is_told(lorenz):
-    truth, t, x, _ = lorenz
-    found = discover(t, x, time_limit=1e-9)
-    assert any("the time limit ended the search" in text for text in found.warnings)
-    assert not any("time limit" in text for text in discover(t, x, time_limit=1e9).warnings)
 
 
 def test_kicks_are_not_sought_when_the_time_is_over(monkeypatch):
@@ -250,24 +210,13 @@ def test_kicks_are_not_sought_when_the_time_is_over(monkeypatch):
     assert "the time limit ended the search" in found.warnings[0]
 
 
-@pytest.mark.parametrize("limit", [0, -1.0, "soon", np.nan])
-def test_bad_time_limits_are_refused(limit):
-    t = np.linspace(0, 10, 50)
-    with pytest.raises(ValueError, match="time_limit: must be"):
-        discover(t, np.sin(t)[:, None], time_limit=limit)
-
-
 # -- warnings --------------------------------------------------------------------------------------
 
 
 def test_a_law_outside_the_library_is_suspected():
-    t = np.linspace(0, 40, 800)
-    from scipy.integrate import solve_ivp
-
-    pendulum = solve_ivp(
-        lambda _, x: [x[1], -np.sin(3 * x[0])], (0, 40), [0.9, 0], t_eval=t, rtol=1e-9
-    )
-    x = add_noise(pendulum.y.T, 0.005, np.random.default_rng(0))
+    t = np.linspace(0, 40, 400)
+    duffing = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -3, "x^3": 4}})
+    x = add_noise(duffing.simulate(t, (0.7, 0)), 0.005, np.random.default_rng(0))
     found = discover(t, x, degree=1)
     assert found.status == "suspect"
     assert any("outside the library" in warning for warning in found.warnings)
@@ -295,73 +244,33 @@ def test_a_coarse_trajectory_is_suspected():
 
 
 def test_pure_noise_gives_no_law_without_a_warning():
-    x = np.random.default_rng(0).normal(size=(400, 2))
-    found = discover(np.arange(400.0), x)
-    assert found.status == "suspect"
+    x = np.random.default_rng(0).normal(size=(200, 2))
+    found = discover(np.arange(200.0), x)
+    assert (found.status, found.system.order, found.note) == ("suspect", 1, "")
 
 
 # -- input ---------------------------------------------------------------------------------------
 
 
-def test_fewer_samples_than_unknowns_are_refused():
-    _, t, x = measured("Lorenz", 0.0, n=20)
-    with pytest.raises(ValueError, match="x: must hold at least as many samples as unknowns"):
-        discover(t, x)
+@pytest.mark.parametrize(
+    ("shape", "options", "message"),
+    [
+        ((20, 3), {}, "x: must hold at least as many samples as unknowns"),
+        ((200, 1), {"degree": "3"}, "degree: must be"),
+        ((200, 1), {"time_limit": 0}, "time_limit: must be"),
+        ((200, 1), {"time_limit": "soon"}, "time_limit: must be"),
+    ],
+)
+def test_bad_input_is_refused(shape, options, message):
+    t, x = np.arange(shape[0]), np.random.default_rng(0).normal(size=shape)
+    with pytest.raises(ValueError, match=message):
+        discover(t, x, **options)
 
 
 def test_a_coordinate_that_stands_still_is_refused():
     t = np.linspace(0, 10, 200)
     with pytest.raises(ValueError, match="x: every coordinate must move, got a constant column 1"):
         discover(t, np.stack([np.sin(t), np.ones_like(t)], axis=1))
-
-
-def test_trajectories_of_different_dimension_are_refused():
-    t = np.linspace(0, 10, 100)
-    with pytest.raises(ValueError, match="t: a list of trajectories must hold"):
-        discover([(t, np.sin(t)[:, None]), (t, np.sin(t)[:, None] + np.eye(2)[0])])
-    with pytest.raises(ValueError, match="t: a list of trajectories must hold"):
-        discover([])
-
-
-def test_a_single_trajectory_needs_both_arrays():
-    t = np.linspace(0, 10, 100)
-    for nonsense in (t, None, [t, t, t]):
-        with pytest.raises(ValueError, match="x: must be given, unless t is a list of pairs"):
-            discover(nonsense)
-
-
-@pytest.mark.parametrize("degree", [-1, 2.5, 0, "3"])
-def test_bad_degrees_are_refused(degree):
-    _, t, x = measured("Lorenz", 0.0)
-    with pytest.raises(ValueError, match="degree: must be"):
-        discover(t, x, degree=degree)
-
-
-def test_a_term_that_is_worth_its_price_alone_is_kept():
-    """The weakest term of the seven systems, at the noise at which the data hardly tell it."""
-    truth, t, x = measured("Tsucs2", 0.1, n=1500, seed=[7, 2, 100])
-    found = discover(t, x, order=1)
-    assert score(found, truth).exact
-
-
-def test_a_discovery_has_one_thread_and_gives_the_others_back(monkeypatch):
-    def threads():
-        return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
-
-    within = []
-    monkeypatch.setattr(solver, "_of_order", lambda *_: within.append(threads()))
-    t = np.linspace(0, 10, 50)
-    with threadpool_limits(limits=2, user_api="blas"):
-        discover(t, np.sin(t)[:, None])
-        assert threads() == {2}
-    assert within == [{1}]
-
-
-@pytest.mark.slow
-def test_where_no_path_leads_to_a_law_one_that_tolerates_more_is_the_start():
-    """A bend of space made terms at the errors first tolerated, and no path leads past them."""
-    data = FlowContest("SprottF", "bent space 0.3 %", seed=51).data()
-    assert score(discover(data.t, data.x, degree=data.degree), data.truth).exact
 
 
 # ------------------------------------------------------------------------------------------ threads
@@ -371,7 +280,7 @@ def threads():
     return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
 
 
-def test_overlapping_limits_give_back_what_was_there():
+def test_a_discovery_has_one_thread_and_gives_back_what_was_there(monkeypatch):
     began, second, within = Barrier(2), Barrier(2), []
 
     def longer():
@@ -392,7 +301,72 @@ def test_overlapping_limits_give_back_what_was_there():
         first()
         other.join()
         assert threads() == {2}
-        with one_blas_thread():
-            assert threads() == {1}
+        monkeypatch.setattr(solver, "_of_order", lambda *_: within.append(threads()))
+        discover(np.linspace(0, 10, 50), np.sin(np.linspace(0, 10, 50))[:, None])
         assert threads() == {2}
-    assert within == [{1}]
+    assert within == [{1}, {1}]
+
+
+# ----------------------------------------------------------------------------------------- rounding
+
+CASES = [("Lorenz", 0.0), ("SprottF", 0.1)]
+MORE = [(name, noise) for name in SYSTEMS for noise in (0.0, 0.02, 0.1, 0.2)]
+PROCESS = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+from test_solver import outcome
+print(json.dumps(outcome()))
+"""
+
+
+def samples(name, noise, n=400):
+    t, x = SYSTEMS[name].shift(REFERENCE_OFFSET).trajectory(n)
+    return t, add_noise(x, noise, np.random.default_rng(8))
+
+
+def assert_same(coefficients, errors, others):
+    live = coefficients != 0
+    assert (live == (others != 0)).all()
+    assert (np.abs(others - coefficients)[live] / errors[live]).max() < 0.01
+
+
+def check_disturbed(name, noise, n, draws):
+    t, x = samples(name, noise, n)
+    found = discover(t, x)
+    for draw in range(draws):
+        disturbed = x * (1 + 1e-9 * np.random.default_rng(draw).standard_normal(x.shape))
+        other = discover(t, disturbed)
+        assert_same(found.coefficients, found.standard_errors, other.coefficients)
+        assert other.status == found.status
+
+
+@pytest.mark.parametrize(("name", "noise"), CASES)
+def test_a_disturbance_of_the_ninth_digit_does_not_count(name, noise):
+    check_disturbed(name, noise, n=400, draws=1)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("name", "noise"), MORE)
+def test_a_disturbance_of_the_ninth_digit_does_not_count_anywhere(name, noise):
+    check_disturbed(name, noise, n=800, draws=2)
+
+
+def outcome():
+    """A chaotic path as a digest; coefficients and standard errors of what is found."""
+    path = hashlib.sha256(SYSTEMS["SprottF"].trajectory(800)[1].tobytes()).hexdigest()
+    found = discover(*samples("SprottF", 0.1))
+    return path, found.coefficients.tolist(), found.standard_errors.tolist()
+
+
+def test_a_kernel_of_linear_algebra_does_not_count():
+    """With scipy's integrator the end of this path moved by its whole width."""
+    here = {"PYTHONPATH": str(Path(vidsindy_lite.__file__).parents[1])}
+    kernel = {"OPENBLAS_CORETYPE": "Haswell", "OMP_NUM_THREADS": "2"}
+    ran = subprocess.run(
+        [sys.executable, "-c", PROCESS, str(Path(__file__).parent)],
+        env=os.environ | here | kernel, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    digest, found, errors = json.loads(ran.stdout)
+    path, coefficients, _ = outcome()
+    assert digest == path
+    assert_same(np.array(found), np.array(errors), np.array(coefficients))

@@ -6,15 +6,15 @@ import pytest
 
 from vidsindy_lite.dynamics import smooth
 from vidsindy_lite.study import baselines
-from vidsindy_lite.study.baselines import BASELINES, RIDGE, THRESHOLDS, WEAK_WIDTH, WEAK_WINDOWS
-from vidsindy_lite.study.corruption import add_noise, drop_blocks, drop_fibers
+from vidsindy_lite.study.baselines import BASELINES, RIDGE, WEAK_WIDTH, WEAK_WINDOWS
+from vidsindy_lite.study.corruption import add_noise, drop_blocks
 from vidsindy_lite.study.metrics import score
-from vidsindy_lite.study.paper import REFERENCE_OFFSET, SYSTEMS
+from vidsindy_lite.study.paper import SYSTEMS
 
 pytestmark = pytest.mark.slow  # fits ensembles
 
 TRUTH = SYSTEMS["Lorenz"]
-T, X = TRUTH.trajectory(600)
+T, X = TRUTH.trajectory(500)
 
 
 @pytest.fixture
@@ -36,13 +36,13 @@ def by_hand(name, threshold):
     np.random.seed(0)  # noqa: NPY002
     if name == "E-SINDy":
         # The seed is set once, before the fits that choose the threshold: run through them.
-        for h in (*THRESHOLDS, None):
+        for h in (*baselines.THRESHOLDS, None):
             chosen = threshold if h is None else h
             bagging = pysindy.EnsembleOptimizer(
                 pysindy.STLSQ(threshold=chosen, alpha=RIDGE), bagging=True, n_models=20
             )
             model = pysindy.SINDy(feature_library=library, optimizer=bagging)
-            model.fit(X[:480] if h is not None else X, t=T[:480] if h is not None else T)
+            model.fit(X[:400] if h is not None else X, t=T[:400] if h is not None else T)
         return model
     weak = pysindy.WeakPDELibrary(
         function_library=library, spatiotemporal_grid=T, K=WEAK_WINDOWS,
@@ -51,16 +51,20 @@ def by_hand(name, threshold):
     return pysindy.SINDy(feature_library=weak, optimizer=optimizer).fit(X, t=T)
 
 
-@pytest.mark.parametrize("name", BASELINES)
+# Central differences at 100 samples a period are good for a percent; the weak form needs none.
+@pytest.mark.parametrize(
+    ("name", "most"),
+    [("PySINDy", 2e-2), ("E-SINDy", 2e-2), ("WeakSINDy", 1e-5), ("Model-A", 1e-3)],
+)
 @pytest.mark.filterwarnings("ignore:.*axes labeled", "ignore:Sparsity parameter is too big")
-def test_clean_lorenz_agrees_with_a_direct_call(name, monkeypatch):
+def test_clean_lorenz_is_found_as_by_a_direct_call(name, most, monkeypatch, short_grid):
     chosen = []
     least_squares = baselines._least_squares
     monkeypatch.setattr(
         baselines, "_least_squares", lambda h, *r: (chosen.append(h), least_squares(h, *r))[1]
     )
     found = BASELINES[name](T, X)
-    assert chosen[:-1] == list(THRESHOLDS)
+    assert chosen[:-1] == list(baselines.THRESHOLDS)
     model = by_hand(name, chosen[-1])
     names = model.feature_library.get_feature_names(["x", "y", "z"])
     names = [term.replace(" ", "").replace("^", "") for term in names]
@@ -68,30 +72,13 @@ def test_clean_lorenz_agrees_with_a_direct_call(name, monkeypatch):
     assert sorted(names) == sorted(ours)
     expected = model.coefficients().T[[names.index(term) for term in ours]]
     np.testing.assert_allclose(found.coefficients, expected, rtol=1e-9, atol=1e-12)
-
-
-# Central differences at 100 samples a period are good for a percent; the weak form needs none.
-@pytest.mark.parametrize(
-    ("name", "most"),
-    [("PySINDy", 2e-2), ("E-SINDy", 2e-2), ("WeakSINDy", 1e-5), ("Model-A", 1e-3)],
-)
-def test_clean_lorenz_is_found_in_its_own_frame(name, most):
-    result = score(BASELINES[name](T, X), TRUTH)
+    result = score(found, TRUTH)
     assert result.exact
     assert result.l2 < most
 
 
 @pytest.mark.parametrize("name", BASELINES)
-def test_the_time_step_is_taken_from_the_times(name, short_grid):
-    fast, slow = BASELINES[name](T / 2, X), BASELINES[name](T, X)
-    # Equal but for the terms that fall to an absolute threshold in one and not in the other.
-    size = np.linalg.norm(slow.coefficients)
-    assert np.linalg.norm(fast.coefficients - 2 * slow.coefficients) < 0.02 * size
-
-
-@pytest.mark.parametrize("name", BASELINES)
-@pytest.mark.parametrize("drop", [drop_blocks, drop_fibers])
-def test_missing_rows_never_reach_pysindy(name, drop, monkeypatch, short_grid):
+def test_missing_rows_never_reach_pysindy(name, monkeypatch, short_grid):
     seen = []
 
     def watched(cls, method):
@@ -110,7 +97,7 @@ def test_missing_rows_never_reach_pysindy(name, drop, monkeypatch, short_grid):
     watched(pysindy.WeakPDELibrary, "fit")
     watched(pysindy.FiniteDifference, "__call__")
     watched(pysindy.STLSQ, "fit")
-    x = drop(X, 0.2, np.random.default_rng(0))
+    x = drop_blocks(X, 0.2, np.random.default_rng(0))
     x[::97, 1] = np.nan  # one coordinate alone is enough to lose a row
     found = BASELINES[name](T, x)
     assert len(seen) >= 10
@@ -135,8 +122,6 @@ def test_seeds_are_local_and_repeatable(name, short_grid):
     first, again, other = (BASELINES[name](t, x, seed=seed).coefficients for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert not np.array_equal(first, other)
-    with pytest.raises(ValueError, match="x: must hold 5 samples in a row"):
-        BASELINES[name](T[:4], X[:4], seed=1)
     np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
 
 
@@ -150,22 +135,11 @@ def test_degree_and_dimension_are_free(name, short_grid):
     np.testing.assert_allclose(found.coefficients, [[0, 0], [0, -1], [1, 0]], atol=0.01)
 
 
-def test_the_ridge_penalty_of_pysindy_spoils_a_shifted_library():
-    truth = SYSTEMS["SprottE"].shift(REFERENCE_OFFSET)
-    t, x = truth.trajectory(1500)
-    assert score(baselines.stlsq(t, x), truth).exact
-    assert score(baselines.stlsq(t, x, ridge=0.05), truth).false_positives > 0
-
-
 @pytest.mark.parametrize("name", BASELINES)
 def test_bad_input(name, short_grid):
     method = BASELINES[name]
     with pytest.raises(ValueError, match="t: must increase"):
         method(T[::-1], X)
-    with pytest.raises(ValueError, match="x: must not be infinite"):
-        method(T, np.where(X > 10, np.inf, X))
-    with pytest.raises(ValueError, match=r"x: must have shape \(n, d\)"):
-        method(T, X[:, 0])
     with pytest.raises(ValueError, match="x: must hold 5 samples in a row"):
         method(T[:4], X[:4])
     with pytest.raises(ValueError, match="degree"):

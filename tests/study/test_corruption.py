@@ -104,7 +104,6 @@ def test_errors_are_copies_that_repeat_with_their_seed_and_none_at_level_zero(co
 @pytest.mark.parametrize(
     ("corrupt", "x", "level", "message"),
     [
-        (add_noise, np.zeros(5), 0.1, r"x: must have shape \(n, d\).* got \(5,\)"),
         (drop_blocks, np.full((5, 1), np.inf), 0.1, "x: must not be infinite, got 5"),
         (drop_blocks, np.zeros((500, 1)), 1.0, "rate: must be .* got 1"),
         (drop_fibers, np.zeros((10, 1)), 0.9, "rate: 5 separate gaps of 9 rows .* into 10 rows"),
@@ -121,21 +120,19 @@ def test_proportional_noise_grows_with_the_signal():
     np.testing.assert_allclose(error.std(axis=0), [0.15, 1.5], rtol=0.03)
 
 
-def test_correlated_noise_remembers():
+@pytest.mark.parametrize(
+    ("corrupt", "remembered"),
+    [
+        (add_correlated_noise, {1: 0.9, 5: 0.9**5}),
+        (add_averaged_noise, {1: 8 / 9, 5: 4 / 9, 9: 0, 20: 0}),
+    ],
+)
+def test_noise_remembers(corrupt, remembered):
     x = waves(20_000)
-    rng = np.random.default_rng(0)
-    error = add_correlated_noise(x, 0.05, rng) - x
+    error = corrupt(x, 0.05, np.random.default_rng(0)) - x
     np.testing.assert_allclose(error.std(axis=0), 0.05 * x.std(axis=0), rtol=0.1)
     for column in error.T:
-        assert np.corrcoef(column[1:], column[:-1])[0, 1] == pytest.approx(0.9, abs=0.03)
-
-
-def test_averaged_noise_forgets_after_its_width():
-    x = waves(20_000)
-    error = add_averaged_noise(x, 0.05, np.random.default_rng(0)) - x
-    np.testing.assert_allclose(error.std(axis=0), 0.05 * x.std(axis=0), rtol=0.1)
-    for column in error.T:
-        for lag, expected in ((1, 8 / 9), (5, 4 / 9), (9, 0), (20, 0)):
+        for lag, expected in remembered.items():
             found = np.corrcoef(column[lag:], column[:-lag])[0, 1]
             assert found == pytest.approx(expected, abs=0.05)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics import PolynomialSystem, runge_kutta_4
+from vidsindy_lite.dynamics import runge_kutta_4
 from vidsindy_lite.study.metrics import score
 from vidsindy_lite.study.paper import (
     ABLATION,
@@ -65,29 +65,6 @@ def test_the_ground_truths_of_table_s2_are_the_shifted_systems(name):
     assert result.max_coefficient_error < printed
 
 
-def test_trajectory_starts_at_the_shifted_initial_condition():
-    system = SYSTEMS["Lorenz"].shift(REFERENCE_OFFSET)
-    t, x = system.trajectory(30)
-    np.testing.assert_allclose(x[0], (2, 17, 27))
-    np.testing.assert_allclose(np.diff(t), 0.015)
-
-
-@pytest.mark.parametrize("name", SYSTEMS)
-def test_runge_kutta_agrees_with_the_adaptive_method(name):
-    system = SYSTEMS[name]
-    t, x = system.trajectory(100)
-    rk4 = runge_kutta_4(system, t, system.x0, substeps=20)
-    assert np.abs(rk4 - x).max() < 1e-5 * np.ptp(x, axis=0).max()
-
-
-def test_runge_kutta_is_of_fourth_order():
-    law = PolynomialSystem.from_terms({"x": {"x": -1}})
-    errors = [
-        abs(runge_kutta_4(law, np.array([0.0, 1.0]), [1.0], n)[-1, 0] - np.exp(-1)) for n in (4, 8)
-    ]
-    assert 14 < errors[0] / errors[1] < 18
-
-
 @pytest.mark.parametrize(("systems", "count"), [(SYSTEMS, 7), (FLOWS, 12)])
 def test_a_system_that_there_is_not_is_told_with_those_that_there_are(systems, count):
     with pytest.raises(KeyError, match="system: must be one of Lorenz, .*, got 'Lorentz'"):
@@ -102,9 +79,7 @@ def test_a_system_that_there_is_not_is_told_with_those_that_there_are(systems, c
 def test_bad_steps_are_refused():
     law = SYSTEMS["Lorenz"]
     for t, x0, substeps, name in [
-        ([0, np.inf], law.x0, 1, "t"), ([0, 1], [1, 2, np.nan], 1, "x0"),
-        ([0, 1], [1, 2], 1, "x0"), ([0, 1], 1.0, 1, "x0"), ([0, 1], np.ones((3, 2)), 1, "x0"),
-        ([0, 1], law.x0, 0, "substeps"),
+        ([0, np.inf], law.x0, 1, "t"), ([0, 1], [1, 2], 1, "x0"), ([0, 1], law.x0, 0, "substeps"),
     ]:  # fmt: skip
         with pytest.raises(ValueError, match=f"^{name}: must (be|have)"):
             runge_kutta_4(law, t, x0, substeps)
@@ -116,7 +91,6 @@ def test_bad_steps_are_refused():
         (lambda law: replace(law, period=0), "period: must be positive"),
         (lambda law: replace(law, x0=(1, 2)), "x0: must be 3 finite numbers"),
         (lambda law: law.times(0), "n: must be an integer of at least 1, got 0"),
-        (lambda law: law.times(2.5), "n: must be an integer of at least 1, got 2.5"),
         (lambda law: law.trajectory(5, -1), "samples_per_period: must be positive, got -1"),
     ],
 )

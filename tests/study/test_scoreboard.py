@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics import path
-from vidsindy_lite.study import FLOWS, ODEBENCH, RIVALS, SYSTEMS, scoreboard
+from vidsindy_lite.study import ODEBENCH, SYSTEMS, scoreboard
 from vidsindy_lite.study.scoreboard import (
     ERRORS,
     MOTIONS,
@@ -59,34 +58,13 @@ def test_the_lorenz_grid_is_that_of_its_authors():
     assert (data.x - clean).std() == pytest.approx(0.4 * 12.75, rel=0.1)
 
 
-def test_where_the_origin_is_known_no_other_is_sought():
-    """Of the same samples, those that look like a law around another origin."""
-    (sought,) = run_contest(LorenzContest(4, 0.4, seed=1))
-    (known,) = run_contest(LorenzContest(4, 0.4, seed=1, origin="data"))
-    assert not sought.exact
-    assert known.exact
-
-
 @pytest.mark.parametrize("error", [*ERRORS, *MOTIONS])
 def test_flows_are_seen_from_one_origin_whatever_the_error(error):
-    contest = FlowContest("Lorenz", error, samples=300)
-    data = contest.data()
-    clean = SYSTEMS["Lorenz"].trajectory(300)[1]
-    shift = (data.x - clean).mean(axis=0)
+    data = FlowContest("Lorenz", error, samples=300).data()
     origin = FlowContest("Lorenz", "drift 0.2 %", samples=300).data().truth
     np.testing.assert_array_equal(data.truth.coefficients, origin.coefficients)
-    start = data.truth(clean[0] + np.round(shift, 1))
-    assert np.isfinite(start).all()
-    assert (data.x - clean - shift).any()
-
-
-def test_flows_have_the_period_that_is_written_down():
-    for name, flow in FLOWS.items():
-        if name not in SYSTEMS:
-            _, x = flow.trajectory(3000)
-            rates = flow(x) / x.std(axis=0)
-            period = 2 * np.pi / np.sqrt((rates**2).mean(axis=0).mean())
-            assert 0.5 < flow.period / period < 2, name
+    off = data.x - SYSTEMS["Lorenz"].trajectory(300)[1]
+    assert (off - off.mean(axis=0)).any()
 
 
 def test_outcomes_are_counted(monkeypatch):
@@ -107,17 +85,8 @@ def test_outcomes_are_counted(monkeypatch):
     assert not table["wrong, ok"].any()
 
 
-def test_a_law_that_is_right_follows_the_motion_and_one_that_blows_up_does_not():
-    data = OdeContest(54, tight=True).data()
-    assert scoreboard._r2(data.truth, *data.clean) > 0.99
-    runaway = data.truth.shift((0, 0, 0))
-    wild = type(runaway).from_terms({"x": {"x^3": 1}, "y": {"y": 1}, "z": {"1": 1}})
-    assert scoreboard._r2(wild, *data.clean) == -np.inf
-
-
-@pytest.mark.slow
 def test_a_contest_with_all_methods():
-    contest = LorenzContest(4, 0.025, methods=scoreboard.CONTESTANTS)
+    contest = LorenzContest(4, 0.025, methods=scoreboard.CONTESTANTS, origin="data")
     table = standings([run_contest(contest)]).set_index("method")
     assert table.exact["Gauss-Newton"]
     silent = dict.fromkeys(scoreboard.CONTESTANTS[1:-1], "silent")
@@ -138,7 +107,6 @@ def test_the_oracle_follows_the_clean_path_at_least_as_closely_as_its_candidates
     [
         (lambda: FlowContest("Lorentz", "drift 0.2 %"), "flow: must be one of .* got 'Lorentz'"),
         (lambda: FlowContest("Lorenz", "noise"), "error: must be one of .* got 'noise'"),
-        (lambda: LorenzContest(4, 0.1, origin="nowhere"), "origin: must be one of learn, data"),
         (lambda: run_contest(LorenzContest(4, 0.1, methods=("guess",))), "methods: must be one of"),
         (lambda: Ablation(LorenzContest(4, 0.1), "luck"), "without: must be"),
     ],
@@ -176,25 +144,7 @@ def test_the_table_of_the_ablation_counts_what_is_lost_and_gained():
     assert table.loc["path"].tolist() == [2, 1, 1, 1, 1, 4.0]
 
 
-@pytest.mark.slow
-def test_without_the_first_law_at_a_large_error_a_law_is_found_all_the_same():
-    _, outcome = run_ablation(Ablation(LorenzContest(10.0, 0.05), "first tolerance"))
-    assert path.TOLERATED > 0
-    assert outcome.exact
-
-
 # ------------------------------------------------------------------------------ what others print
-
-
-def test_published_rates():
-    grid, odebench = RIVALS["lorenz_grid"], RIVALS["odebench"]
-    rates = np.array(grid["exact"]) / grid["draws"]
-    assert rates.shape == (len(grid["levels"]), len(grid["lengths"])) == (16, 7)
-    assert rates.mean() == pytest.approx(0.787, abs=5e-4)
-    levels = np.isin(np.round(grid["levels"], 3), (0.1, 0.2, 0.25, 0.3, 0.4))
-    assert rates[levels].mean() == pytest.approx(0.735, abs=5e-4)
-    assert odebench["rates"]["SINDy"][odebench["conditions"].index([0.05, 0.5])] == 9.5
-    assert all(len(row) == 5 for row in odebench["rates"].values())
 
 
 def test_odebench_is_complete():
@@ -202,7 +152,7 @@ def test_odebench_is_complete():
     dimensions = [len(one.starts[0]) for one in ODEBENCH.values()]
     assert [dimensions.count(d) for d in (1, 2, 3, 4)] == [23, 28, 10, 2]
     degrees = [e.law.exponents.sum(axis=1).max() for e in ODEBENCH.values() if e.law is not None]
-    assert (len(degrees), sum(degree <= 3 for degree in degrees)) == (37, 35)
+    assert (len(degrees), sum(one.is_cubic for one in ODEBENCH.values())) == (37, 35)
     assert len({equation.name for equation in ODEBENCH.values()}) == 63
     for equation in ODEBENCH.values():
         assert len(set(equation.starts)) == 2
@@ -228,8 +178,3 @@ def allee(x):
 )
 def test_equations_are_what_the_textbooks_print(number, start, rate):
     np.testing.assert_allclose(ODEBENCH[number].rate(np.array(start)), rate(*start))
-
-
-def test_a_solution_that_is_known():
-    path = ODEBENCH[2].law.simulate(TIMES, (4.78,))[:, 0]
-    np.testing.assert_allclose(path, 4.78 * np.exp(0.23 * TIMES), rtol=1e-9)

@@ -5,7 +5,6 @@ import hashlib
 import json
 import math
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -18,8 +17,6 @@ import pytest
 from vidsindy_lite.repository import PACKAGE
 from vidsindy_lite.study.sweeps import remember, sweep
 from vidsindy_lite.vision import Scene, video_info
-
-pytestmark = pytest.mark.slow  # starts processes
 
 # A module of the package, with a function that takes notes of its calls.
 TOY = '''\
@@ -44,16 +41,14 @@ def square(task):
     """A result with random numbers, from the task alone."""
     with open(os.environ["CALLS"], "a") as calls:
         calls.write(f"{task.number}\\n")
+    with open(os.environ["THREADS"], "a") as threads:
+        threads.write(f"{cv2.getNumThreads()} ")
+        threads.writelines(f"{pool['num_threads']} " for pool in threadpool_info())
     time.sleep(task.pause)
     if task.number < 0:
         raise ArithmeticError("below zero")
     # a comment
     return power(task.number), np.random.default_rng(task.number).normal(size=3).tolist()
-
-
-def threads(task):
-    """Threads of BLAS (OpenMP) and OpenCV in the process of this task."""
-    return [cv2.getNumThreads(), *(pool["num_threads"] for pool in threadpool_info())]
 '''
 SWEEP = """\
 import json
@@ -63,8 +58,8 @@ from vidsindy_lite import toy
 from vidsindy_lite.study.sweeps import sweep
 
 if __name__ == "__main__":
-    function, tasks = getattr(toy, sys.argv[1]), json.loads(sys.argv[2])
-    print(json.dumps(sweep(function, [toy.Task(*task) for task in tasks], desc="toy")))
+    tasks = [toy.Task(*task) for task in json.loads(sys.argv[1])]
+    print(json.dumps(sweep(toy.square, tasks, desc="toy", jobs=int(sys.argv[2]))))
 """
 
 
@@ -87,29 +82,35 @@ class Clone:
         for module in ("repository.py", "values.py", "study/sweeps.py"):
             (self.package / module).write_bytes((PACKAGE / module).read_bytes())
 
-    def start(self, tasks, function="square", **environment):
+    def edit(self, module, old, new):
+        path = self.package / module
+        assert old in path.read_text()
+        path.write_text(path.read_text().replace(old, new))
+
+    @property
+    def environment(self):
+        files = {"CALLS": str(self.calls), "THREADS": str(self.root / "threads.txt")}
+        return os.environ | {"PYTHONPATH": str(self.root)} | files
+
+    def start(self, tasks, jobs=2, **environment):
         """A process that sweeps over tasks, each a list of a number and a pause in seconds."""
         self.calls.write_text("")
-        here = {"PYTHONPATH": str(self.root), "CALLS": str(self.calls)}
         return subprocess.Popen(
-            [sys.executable, str(self.root / "sweep.py"), function, json.dumps(tasks)],
-            env=os.environ | here | environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
+            [sys.executable, str(self.root / "sweep.py"), json.dumps(tasks), str(jobs)],
+            env=self.environment | environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            text=True, start_new_session=True,
+        )  # fmt: skip
 
-    def sweep(self, tasks, function="square", **environment):
+    def sweep(self, tasks, **environment):
         """Results of a sweep to its end."""
-        process = self.start(tasks, function, **environment)
+        process = self.start(tasks, **environment)
         output, errors = process.communicate(timeout=120)
         assert process.returncode == 0, errors
         return json.loads(output)
 
-    def fail(self, tasks, function="square", **environment):
+    def fail(self, tasks, **environment):
         """The last line of the error of a sweep that fails."""
-        process = self.start(tasks, function, **environment)
+        process = self.start(tasks, **environment)
         _, errors = process.communicate(timeout=120)
         assert process.returncode == 1
         return errors.strip().splitlines()[-1]
@@ -138,27 +139,11 @@ def content(file):
     return json.loads(file.read_text().splitlines()[1])["result"]
 
 
-TASKS = [[number, 0.0] for number in range(1, 8)]
-
-
-@pytest.fixture(scope="module")
-def swept_once(tmp_path_factory):
-    """A folder with a clone after a sweep, and the results of that."""
-    folder = tmp_path_factory.mktemp("swept")
-    with pytest.MonkeyPatch.context() as patch:
-        for name in ("VIDSINDY_CACHE", "VIDSINDY_DASK"):
-            patch.delenv(name, raising=False)
-        root = folder / "clone"
-        root.mkdir()
-        return root, Clone(root).sweep(TASKS)
-
-
-@pytest.fixture
-def swept(swept_once, clone):
-    """A clone that holds the results of a sweep, to change, and these results."""
-    root, results = swept_once
-    shutil.copytree(root, clone.root, dirs_exist_ok=True)
-    return clone, results
+def results_of(tasks):
+    """What a sweep over tasks gives."""
+    return [
+        [number**2, np.random.default_rng(number).normal(size=3).tolist()] for number, _ in tasks
+    ]
 
 
 def wait_for(condition):
@@ -172,62 +157,22 @@ def wait_for(condition):
 # ------------------------------------------------------------------------------------- what is kept
 
 
-def test_results_are_in_the_order_of_the_tasks_and_read_back(clone):
-    slow_first = [[3, 1.0], [1, 0.0], [2, 0.0]]
-    first = clone.sweep(slow_first)
-    assert [number for number, _ in first] == [9, 1, 4]
-    assert clone.called() == [1, 2, 3]
-    assert set(clone.stored()) == {1, 2, 3}
-    assert clone.sweep(slow_first[::-1]) == first[::-1]
-    assert clone.called() == []
-    assert [number for number, _ in clone.sweep([*slow_first, [5, 0.0]])] == [9, 1, 4, 25]
-    assert clone.called() == [5]
-
-
-def test_killed_half_way_it_goes_on_with_the_rest(clone, tmp_path):
-    tasks = [[number, 0.3] for number in range(10)]
+@pytest.mark.slow
+def test_killed_half_way_two_at_once_share_the_rest(clone):
+    tasks = [[number, 0.3] for number in range(8)]
     process = clone.start(tasks)
     wait_for(lambda: len(clone.stored()) >= 3)
     os.killpg(process.pid, signal.SIGKILL)
     process.communicate()
     done = set(clone.stored())
-    assert 3 <= len(done) < 10
-    resumed = clone.sweep(tasks)
-    assert set(clone.called()) == set(range(10)) - done
-    assert resumed == clone.sweep(tasks, VIDSINDY_CACHE=str(tmp_path / "uninterrupted"))
-    assert clone.called() == list(range(10))
-
-
-def test_sweeps_that_run_at_once_share_their_tasks(clone):
-    tasks = [[number, 0.5] for number in range(6)]
-    together = [clone.start(tasks) for _ in range(2)]
-    first, second = (process.communicate(timeout=120)[0] for process in together)
-    assert json.loads(first) == json.loads(second)
-    assert clone.called() == list(range(6))
-
-
-def test_a_process_has_one_thread(clone):
-    pools = clone.sweep([[1], [2]], "threads", OMP_NUM_THREADS="2", OPENBLAS_NUM_THREADS="2")
-    assert all(len(pool) > 1 for pool in pools)
-    assert {count for pool in pools for count in pool} == {1}
-
-
-@pytest.mark.parametrize(
-    ("edits", "again"),
-    [
-        ({"toy.py": ("power(task.number)", "1 * power(task.number)")}, True),
-        ({"powers.py": ("number**2", "number * number")}, True),
-        ({"toy.py": ("# a comment", "# another"), "companion/pages.py": ("1", "2")}, False),
-    ],
-)
-def test_other_code_finds_no_results(swept, edits, again):
-    clone, results = swept
-    for file, (old, new) in edits.items():
-        path = clone.package / file
-        assert old in path.read_text()
-        path.write_text(path.read_text().replace(old, new))
-    assert clone.sweep(TASKS) == results
-    assert clone.called() == [number for number, _ in TASKS if again]
+    assert 3 <= len(done) < 8
+    threads = {"OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2"}
+    together = [clone.start(tasks, **threads), clone.start(tasks[::-1], **threads)]
+    first, second = (json.loads(one.communicate(timeout=120)[0]) for one in together)
+    assert first == second[::-1] == results_of(tasks)
+    assert set(clone.called()) == set(range(8)) - done
+    assert len(clone.called()) == 8 - len(done)
+    assert set((clone.root / "threads.txt").read_text().split()) == {"1"}  # in each process
 
 
 DAMAGES = [
@@ -238,15 +183,23 @@ DAMAGES = [
 ]
 
 
-def test_damaged_files_are_computed_again(swept):
-    clone, results = swept
+@pytest.mark.slow
+def test_what_is_stored_is_found_unless_it_is_damaged_or_of_other_code(clone):
+    tasks = [[number, 0.0] for number in range(1, 6)]
+    assert clone.sweep(tasks, jobs=1) == results_of(tasks)
+    assert clone.called() == [1, 2, 3, 4, 5]
     stored = clone.stored()
     whole = {number: file.read_bytes() for number, file in stored.items()}
     for number, damage in enumerate(DAMAGES, start=2):  # of the first task nothing is damaged
         stored[number].write_bytes(damage(whole[number]))
-    assert clone.sweep(TASKS) == results
+    clone.edit("toy.py", "# a comment", "# another")
+    clone.edit("companion/pages.py", "1", "2")
+    assert clone.sweep(tasks, jobs=1) == results_of(tasks)
     assert clone.called() == [2, 3, 4, 5]
     assert {number: file.read_bytes() for number, file in stored.items()} == whole
+    clone.edit("powers.py", "number**2", "number * number")
+    assert clone.sweep(tasks, jobs=1) == results_of(tasks)
+    assert clone.called() == [1, 2, 3, 4, 5]
 
 
 @pytest.mark.parametrize(
@@ -276,6 +229,7 @@ def test_a_planted_file_is_read_and_never_executed(cache, monkeypatch, result):
     assert not (cache / "planted").exists()
 
 
+@pytest.mark.slow
 def test_error_names_the_task_and_what_was_finished_stays(clone):
     error = clone.fail([[1, 0.0], [2, 0.0], [-3, 1.0], [4, 60.0], [5, 60.0]])
     assert error.endswith(
@@ -307,34 +261,25 @@ def cluster(clone):
     (clone.root / "cluster.py").write_text(CLUSTER)
     process = subprocess.Popen(
         [sys.executable, str(clone.root / "cluster.py")],
-        env=os.environ | {"PYTHONPATH": str(clone.root), "CALLS": str(clone.calls)},
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+        env=clone.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
     yield process.stdout.readline().strip()
     process.communicate(timeout=60)
 
 
-def test_cluster_gives_the_results_of_this_machine(clone, cluster, tmp_path):
-    tasks = [[3, 0.5], [1, 0.0], [2, 0.0], [4, 0.0]]
-    here = clone.sweep(tasks, VIDSINDY_CACHE=str(tmp_path / "here"))
-    assert clone.sweep(tasks, VIDSINDY_DASK=cluster) == here
-    assert clone.called() == [1, 2, 3, 4]
-    assert set(clone.stored()) == {1, 2, 3, 4}
+@pytest.mark.slow
+def test_a_cluster_gives_the_same_results_and_only_with_the_same_code(clone, cluster):
+    tasks = [[3, 0.5], [1, 0.0], [2, 0.0]]
+    assert clone.sweep(tasks, VIDSINDY_DASK=cluster) == results_of(tasks)
+    assert clone.called() == [1, 2, 3]
+    assert set(clone.stored()) == {1, 2, 3}
     error = clone.fail([[5, 0.0], [-3, 1.0]], VIDSINDY_DASK=cluster)
     assert error.endswith("square(Task(number=-3, pause=1.0)) raised ArithmeticError: below zero")
     assert 5 in clone.stored()
-
-
-def test_cluster_with_other_code_is_refused(clone, cluster):
-    elsewhere = clone.root / "elsewhere"
-    elsewhere.mkdir()
-    other = Clone(elsewhere)
-    (other.package / "toy.py").write_text(TOY.replace("power(task", "2 * power(task"))
-    error = other.fail([[1, 0.0]], VIDSINDY_DASK=cluster)
+    clone.edit("powers.py", "number**2", "number * number")
+    error = clone.fail([[1, 0.0]], VIDSINDY_DASK=cluster)
     assert "all workers must have this very code of vidsindy_lite, got other code on tcp" in error
-    assert other.called() == []
+    assert clone.called() == []
 
 
 # ---------------------------------------------------------------------------------------- bad input
