@@ -1,5 +1,6 @@
 """The path of laws: a first law, smooth errors, plateaus that compete, and which law persists."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +14,7 @@ from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.model import Form, PolynomialSystem
 from vidsindy_lite.dynamics.path import LARGEST
 from vidsindy_lite.dynamics.problem import pose
-from vidsindy_lite.dynamics.result import History
+from vidsindy_lite.dynamics.result import History, Plateau
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import (
     REFERENCE_OFFSET,
@@ -202,3 +203,15 @@ def test_gaps_come_shortest_first():
     cuts = [t <= 2, (t >= 4) & (t <= 5), (t >= 6) & (t <= 7), t >= 7.5]
     segments = [Segment.even(t[s], np.sin(t[s])[:, None], 0.2, 0) for s in cuts]
     assert paths.gaps(segments) == [(0, 7.0), (0, 5.0), (0, 2.0)]
+
+
+def test_plateaus_whose_law_misses_more_than_they_tolerate_are_passed_over():
+    problem = posed([np.linspace(0, 20, 400)])
+    fit = paths.first_law(problem, History())
+    path = paths.follow(problem, fit)
+    still = Plateau(0, path.lowest, LARGEST, np.zeros_like(path.plateaus[0][0].terms))
+    first, second = path.plateaus
+    promising = replace(path, plateaus=((still, *first), second))
+    assert not promising.widest()[0].terms.any()
+    found = paths.refit(problem, promising, History())
+    np.testing.assert_array_equal(found.state.active, fit.state.active)
