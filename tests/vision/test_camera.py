@@ -3,40 +3,13 @@
 import cv2
 import numpy as np
 import pytest
-from footage import Phone, render_phone, write_phone
+from footage import Phone, render_phone
 
-from vidsindy_lite import track
 from vidsindy_lite.vision import camera
 from vidsindy_lite.vision.background import sample_frames
-from vidsindy_lite.vision.camera import camera_motion, explains, rests, trembling
+from vidsindy_lite.vision.camera import explains, rests, trembling
 from vidsindy_lite.vision.steadying import at_rest, carry
-from vidsindy_lite.vision.video import Reel, reduce, write_video
-
-SHIFTS = np.array([[0, 0], [2, 1], [-1, 2], [1, -2], [2, 2], [-2, 0], [0, -1], [1, 1]])
-
-
-def views(softness):
-    """A scene of grains or of clouds as a camera shows it that trembles."""
-    rng = np.random.default_rng(0)
-    grains = rng.uniform(0, 255, (260, 340)).astype(np.float32)
-    scene = cv2.GaussianBlur(grains, (0, 0), softness)
-    scene = 128 + 40 * (scene - scene.mean()) / scene.std()
-    for right, down in SHIFTS:
-        view = scene[10 + down : 250 + down, 10 + right : 330 + right]
-        noisy = view + rng.normal(0, 2, view.shape)
-        yield np.repeat(np.clip(noisy, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
-
-
-def test_a_camera_that_trembles_before_grains_is_followed(tmp_path):
-    film = Reel(write_video(tmp_path / "clip.mov", views(2.5)))
-    small = np.array(list(film))
-    motion, sure = camera_motion(film, small, np.arange(len(small)))
-    assert sure
-    np.testing.assert_allclose(motion.maps[:, :2, 2], SHIFTS, atol=0.1)
-
-
-# ---- whether a camera's motion explains its frames better than rest does, where the truth is known
-
+from vidsindy_lite.vision.video import Reel, write_video
 
 SMALL = 160, 120
 N = 21
@@ -116,9 +89,6 @@ def test_samples_of_which_the_motion_is_not_known_say_nothing():
     assert explains(frames, maps, known)
 
 
-# ---- a camera that trembles before ground without corners
-
-
 SKY = Phone("sky", 40, noise=3, image_size=(320, 240), frames=60)
 
 
@@ -142,11 +112,13 @@ def test_all_frames_together_tell_how_a_camera_trembles_before_a_sky(tmp_path):
     moved = np.linalg.norm(there - here, axis=1)
     error = np.linalg.norm(carry(motion.maps, there) - here, axis=1)[known]
     assert np.median(error) < min(0.4, 0.4 * np.median(moved))
+    told = np.sqrt(2 * np.mean(motion.errors[known] ** 2))
+    assert 0.6 < np.sqrt(np.mean(error**2)) / told < 1.4
     np.testing.assert_allclose(motion.maps[0], np.eye(3), atol=1e-9)
     assert motion.errors[0] == 0
 
 
-@pytest.mark.parametrize("change", [{}, {"size": 90}, {"person": True, "leaves": True}])
+@pytest.mark.parametrize("change", [{"size": 90}, {"person": True, "leaves": True}])
 def test_nothing_else_is_taken_for_a_motion_of_the_camera(tmp_path, monkeypatch, change):
     path, *_ = film(tmp_path, 1, **change)
     assert by_the_plate(path) is None
@@ -160,40 +132,5 @@ def test_nothing_else_is_taken_for_a_motion_of_the_camera(tmp_path, monkeypatch,
     assert by_the_plate(path) is None
 
 
-@pytest.mark.parametrize("background", ["plain", "sky"])
-def test_what_is_too_plain_or_moves_too_far_is_not_told(tmp_path, background):
-    assert by_the_plate(film(tmp_path, 1, background=background, camera="held")[0]) is None
-
-
-def test_maps_are_those_of_whole_frames(tmp_path):
-    path, here, there = film(tmp_path, 1, camera="trembling", image_size=(640, 480))
-    samples = np.array([reduce(sample, 2) for sample in sample_frames(Reel(path))])
-    motion = trembling(Reel(path, 320), samples)
-    error = np.linalg.norm(carry(motion.maps, there) - here, axis=1)
-    assert np.median(error[np.isfinite(motion.errors)]) < 0.5
-
-
-def test_a_ball_before_a_sky_is_tracked_with_a_camera_that_trembles(tmp_path):
-    phone = Phone("sky", 40, noise=3.6, camera="trembling", bitrate=2_000_000, frames=60)
-    here, there = write_phone(tmp_path / "clip.mp4", phone, 4)
-    result = track(tmp_path / "clip.mp4")
-    error = np.linalg.norm(result.pixels - here, axis=1)
-    assert np.isfinite(error).all()
-    assert np.nanmedian(error) < 0.4
-    assert np.median(np.linalg.norm(there - here, axis=1)) > 0.9
-    assert result.warnings == ()
-
-
-def test_errors_are_as_large_as_they_are_told(tmp_path):
-    ratios = []
-    for seed in range(1, 5):
-        phone = Phone(**(vars(SKY) | {"camera": "trembling", "bitrate": 2_000_000}))
-        here, there = write_phone(tmp_path / "clip.mp4", phone, seed)
-        motion = by_the_plate(tmp_path / "clip.mp4")
-        if motion is None:
-            continue
-        known = np.isfinite(motion.errors) & (motion.errors > 0)
-        error = (carry(motion.maps, there) - here)[known]
-        ratios.append(np.sqrt((error**2).mean() / (motion.errors[known] ** 2).mean()))
-    assert len(ratios) >= 3
-    assert 0.6 < np.exp(np.mean(np.log(ratios))) < 1.1
+def test_what_moves_too_far_is_not_told(tmp_path):
+    assert by_the_plate(film(tmp_path, 1, camera="held")[0]) is None
