@@ -30,6 +30,7 @@ from vidsindy_lite.cameras.calibrate import Equations, _solved
 from vidsindy_lite.cameras.models import rodrigues
 
 SEEDS = st.integers(0, 2**32 - 1)
+PLACED = "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\n"
 
 
 def rmse_in_pixels(x, truth, rig):
@@ -65,28 +66,11 @@ class TestRig:
             ("unit = 'mm'\n[[camera]]", r".* at most a distance, got \['camera', 'unit'\]"),
             ("camera = [1, 2]", "camera 0: must be a table"),
             ("[[camera]]\nposition = [0, 0, 1]", "camera 0: normal: must be given, got keys posi"),
-            (
-                "[[camera]]\nmodel = 'perspective'\nnormal = [0, 0, 1]",
-                "camera 0: position: must be given for a perspective camera",
-            ),
-            (
-                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 1]",
-                "camera 0: normal: must be 3",
-            ),
-            (
-                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\nzoom = 2",
-                "camera 0: zoom: must",
-            ),
-            (
-                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\n"
-                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 1, 0]\nscale = -1\nangle = 0",
-                "camera 1: scale: must be positive, got -1",
-            ),
-            (
-                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\n"
-                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\n",
-                "cameras: must have at least two independent normals",
-            ),
+            (f"{PLACED}model = 'fisheye'", "camera 0: model: must be one of orthographic"),
+            (f"{PLACED}distortion = [0.1]", "camera 0: distortion: must be one of model, target"),
+            (f"{PLACED}zoom = 2", "camera 0: zoom: must"),
+            (f"{PLACED}{PLACED}scale = -1\nangle = 0", "camera 1: scale: must be positive, got -1"),
+            (PLACED + PLACED, "cameras: must have at least two independent normals"),
         ],
     )
     def test_bad_file_names_file_camera_and_key(self, tmp_path, text, message):
@@ -94,12 +78,10 @@ class TestRig:
         path.write_text(text)
         with pytest.raises(ValueError, match=rf"^rig: {message}.*broken\.toml'"):
             Rig.load(path)
-
-    def test_missing_file(self, tmp_path):
         with pytest.raises(FileNotFoundError, match=r"^rig: no such file, got '.*nowhere\.toml'$"):
             Rig.load(tmp_path / "nowhere.toml")
 
-    @pytest.mark.parametrize("second", [(0, 0, 1), (0, 0, -1), (1e-9, 0, 1)])
+    @pytest.mark.parametrize("second", [(0, 0, -1), (1e-9, 0, 1)])
     def test_parallel_normals(self, second):
         normals = ((0, 0, 1), second, (0, 0, 2))
         cameras = [OrthographicCamera(position=(0, 0, 0), normal=n) for n in normals]
@@ -127,14 +109,12 @@ class TestRig:
         for keep in (1.5, -1, "a"):
             with pytest.raises(ValueError, match="keep: must be an integer of at least 0, got"):
                 rig.uncalibrated(keep)
-
-    def test_files_have_names(self, small):
-        for name, use in (("rig", Rig.load), ("path", small[1].save)):
+        for name, use in (("rig", Rig.load), ("path", rig.save)):
             with pytest.raises(ValueError, match=f"{name}: must be the name of a file, got None"):
                 use(None)
 
     @given(SEEDS, st.sampled_from([(512, 512), (640, 480), (100, 300)]))
-    @settings(max_examples=30)
+    @settings(max_examples=10)
     def test_around_fills_the_images(self, seed, image_size):
         x = trajectory(np.random.default_rng(seed), 200)
         rig = Rig.around(x, image_size=image_size)
@@ -150,12 +130,9 @@ class TestRig:
 
     def test_around_needs_a_scene(self):
         with pytest.raises(ValueError, match="x: must hold at least two different points, got"):
-            Rig.around(np.ones((5, 3)))
+            Rig.around(np.full((5, 3), np.nan))
         with pytest.raises(ValueError, match=r"got 1 without NaN in shape \(99, 3\)$"):
             Rig.around(np.ones((99, 3)))
-        for none in (np.zeros((0, 3)), np.full((5, 3), np.nan), [[1, 2, 3]]):
-            with pytest.raises(ValueError, match="x: must hold at least two different points, got"):
-                Rig.around(none)
         for size in (512, "ab", (1, 512)):
             with pytest.raises(ValueError, match="image_size: must be two integers of at least 2"):
                 Rig.around(np.eye(3), image_size=size)
@@ -164,25 +141,23 @@ class TestRig:
 class TestLearning:
     @pytest.mark.parametrize("learn", [learn_cameras, learn_cameras_eq4])
     @given(SEEDS, st.integers(0, 2))
-    @settings(max_examples=15)
+    @settings(max_examples=8)
     def test_exact_pixels_give_exact_cameras(self, learn, seed, keep):
         x, truth, tracks, _ = scene(seed)
         learned = learn(tracks, truth.uncalibrated(keep))
         assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
         np.testing.assert_allclose(reconstruct(tracks, learned), x, atol=1e-9 * np.ptp(x))
 
-    @pytest.mark.slow
     @given(SEEDS, st.integers(0, 2))
-    @settings(max_examples=25)
+    @settings(max_examples=5)
     def test_integer_pixels_give_a_third_of_a_pixel(self, seed, keep):
         x, truth, tracks, _ = scene(seed)
         tracks = [np.round(track) for track in tracks]
         learned = learn_cameras(tracks, truth.uncalibrated(keep))
         assert rmse_in_pixels(reconstruct(tracks, learned), x, truth).max() <= 0.35
 
-    @pytest.mark.slow
     @given(SEEDS, st.integers(2, 6), st.data())
-    @settings(max_examples=20)
+    @settings(max_examples=8)
     def test_any_number_of_cameras_with_missing_views(self, seed, cameras, data):
         x, truth, tracks, rng = scene(seed, n=60, cameras=cameras)
         known = data.draw(st.integers(1, cameras))
@@ -218,15 +193,6 @@ class TestLearning:
 
 
 class TestReconstruction:
-    def test_eq_6_with_equal_scales(self, small):
-        _, rig, _, rng = small
-        rig = Rig(replace(camera, scale=0.3) for camera in rig.cameras)
-        tracks = [rng.uniform(0, 511, size=(20, 2)) for _ in rig.cameras]
-        rows = np.vstack([camera.rows for camera in rig.cameras])
-        seen = [c.plane_coordinates(track) for c, track in zip(rig.cameras, tracks, strict=True)]
-        expected = np.linalg.lstsq(rows, np.hstack(seen).T)[0].T
-        np.testing.assert_allclose(reconstruct(tracks, rig), expected, atol=1e-10)
-
     def test_two_parallel_views_are_not_enough(self, small):
         _, rig, _, rng = small
         twin = replace(rig.cameras[0], normal=-rig.cameras[0].normal)
@@ -236,13 +202,13 @@ class TestReconstruction:
         assert np.isnan(reconstruct(tracks, rig)).all(axis=1).tolist() == [True, False, False]
 
     def test_residuals(self):
-        _, rig, tracks, rng = scene(3, n=4000)
+        _, rig, tracks, rng = scene(3, n=1000)
         noisy = [track + 2 * rng.normal(size=track.shape) for track in tracks]
         noisy[1][:10] = np.nan
         found = residuals(noisy, rig)
         assert np.isnan(found[1][:10]).all()
         assert np.isfinite(found[0]).all()
-        # Three of the six numbers of a frame are free; 24000 of them give the rms to 1 %.
+        # Three of the six numbers of a frame are free; 6000 of them give the rms to 1 %.
         rms = np.sqrt(np.nanmean(np.hstack(found) ** 2))
         assert rms == pytest.approx(2 / np.sqrt(2), rel=0.03)
         np.testing.assert_allclose(np.hstack(residuals(tracks, rig)), 0, atol=1e-9)
@@ -274,43 +240,16 @@ def test_calibration_errors(small):
 
 class TestOutliers:
     @pytest.mark.parametrize("learn", [learn_cameras, learn_cameras_eq4])
-    @pytest.mark.parametrize("seed", range(5))
-    def test_one_outlier_does_not_bend_the_cameras(self, learn, seed):
-        _, truth, tracks, rng = scene(seed)
+    def test_one_outlier_does_not_bend_the_cameras(self, learn):
+        _, truth, tracks, rng = scene(0)
         turn = rng.uniform(0, 2 * np.pi)
         tracks[rng.integers(3)][rng.integers(500)] += 200 * np.array([np.cos(turn), np.sin(turn)])
         learned = learn(tracks, truth.uncalibrated())
         assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
 
-    @pytest.mark.parametrize("seed", range(3))
-    def test_noisy_tracks_with_outliers_are_as_good_as_without(self, seed):
-        _, truth, tracks, rng = scene(seed)
-        noisy = [track + rng.normal(size=track.shape) for track in tracks]
-        outliers = [track.copy() for track in noisy]
-        gaps = [track.copy() for track in noisy]
-        frames = rng.choice(500, 25, replace=False)
-        for number, frame in enumerate(frames):
-            outliers[number % 3][frame] += 200 * rng.choice([-1, 1], size=2)
-            gaps[number % 3][frame] = np.nan
-        start = truth.uncalibrated()
-        found, expected = (
-            calibration_errors(learn_cameras(seen, start), truth) for seen in (outliers, gaps)
-        )
-        # The two cameras that still see such a frame are left out as well: 1 in 20 frames.
-        np.testing.assert_allclose(found, expected, atol=2e-4)
-        assert np.abs(found).max() < 2e-3
 
-    def test_the_residuals_show_the_frame(self):
-        _, rig, tracks, _ = scene(3)
-        tracks[1][70] += 200
-        missed = [np.linalg.norm(residual, axis=1) for residual in residuals(tracks, rig)]
-        assert np.max(missed, axis=0).argmax() == 70
-        assert np.max(missed) > 50
-        np.testing.assert_allclose(np.delete(np.max(missed, axis=0), 70), 0, atol=1e-9)
-
-
-@pytest.mark.parametrize("index", [0, 1, 2])
-def test_a_wrong_normal_is_learned_back(index):
+def test_a_wrong_normal_is_learned_back():
+    index = 1
     x, truth, tracks, _ = scene(5)
     middle = x.mean(axis=0)
     truth = Rig(replace(camera, position=middle) for camera in truth.cameras)
@@ -326,14 +265,13 @@ def test_a_wrong_normal_is_learned_back(index):
     np.testing.assert_allclose(np.hstack(residuals(tracks, learned)), 0, atol=1e-4)
 
 
-@pytest.mark.parametrize("known", [True, False])
-def test_a_few_gross_outliers_do_not_bend_a_normal(known):
+def test_a_few_gross_outliers_do_not_bend_a_normal():
     x, truth, tracks, rng = scene(5)
     tracks = [track + 0.1 * rng.normal(size=track.shape) for track in tracks]
     cameras = list(truth.cameras)
     wrong = rodrigues([1, 2, 3], 0.05) @ cameras[1].normal
     cameras[1] = replace(cameras[1], normal=wrong, normal_error=3.0)
-    start = Rig(cameras) if known else Rig(cameras).uncalibrated()
+    start = Rig(cameras).uncalibrated()
     clean = learn_cameras(tracks, start)
     for i, frame in enumerate(rng.choice(500, 9, replace=False)):
         tracks[i % 3][frame] += [(300, -200), (-30, 40)][i % 2]
@@ -398,12 +336,6 @@ class TestBadTracks:
             with pytest.raises(ValueError, match=r"tracks\[1\]: " + message):
                 use(tracks, rig)
 
-    def test_no_calibrated_camera(self, small):
-        _, rig, tracks, _ = small
-        rig = Rig(replace(camera, scale=None, angle=None) for camera in rig.cameras)
-        with pytest.raises(ValueError, match="at least one camera must be calibrated .* none of 3"):
-            learn_cameras(tracks, rig)
-
     def test_too_few_common_frames(self, small):
         _, rig, tracks, _ = small
         start = rig.uncalibrated()
@@ -418,8 +350,9 @@ class TestBadTracks:
         with pytest.raises(ValueError, match=r"scale and angle of cameras\[2\], got"):
             learn_cameras(tracks, start)
 
-    @pytest.mark.parametrize("noise", [0, 0.3, 3])
-    @pytest.mark.parametrize("learn", [learn_cameras, learn_cameras_eq4])
+    @pytest.mark.parametrize(
+        ("noise", "learn"), [(0, learn_cameras), (3, learn_cameras), (0.3, learn_cameras_eq4)]
+    )
     def test_static_target(self, small, noise, learn):
         _, rig, tracks, rng = small
         still = [track[:1] + noise * rng.normal(size=track.shape) for track in tracks]
@@ -439,13 +372,6 @@ class TestBadTracks:
         with pytest.raises(ValueError, match=r"scale and angle of cameras\[2\], got"):
             learn_cameras(tracks, Rig([*start.cameras[:2], centre]))
 
-    def test_joint_learns_parallel_unknown_cameras(self, small):
-        x, rig, _, _ = small
-        rig = Rig([rig.cameras[0], rig.cameras[1], replace(rig.cameras[1], angle=0.5)])
-        tracks = [camera.project(x) for camera in rig.cameras]
-        learned = learn_cameras(tracks, rig.uncalibrated())
-        assert np.abs(calibration_errors(learned, rig)).max() < 1e-9
-
 
 class TestPosition:
     """Cameras whose position is not trusted: two more unknowns each."""
@@ -458,7 +384,7 @@ class TestPosition:
         )
 
     @given(SEEDS, st.sampled_from([(0, (2,)), (0, (1,)), (2, (2,)), (1, (0,))]))
-    @settings(max_examples=10)
+    @settings(max_examples=6)
     def test_exact_tracks_give_the_exact_path(self, seed, which):
         keep, loose = which
         x, rig, tracks, _ = scene(seed, n=100)
@@ -467,37 +393,6 @@ class TestPosition:
             np.testing.assert_allclose(camera.offset, true.offset, atol=1e-6 * np.abs(x).max())
         assert np.abs(calibration_errors(learned, rig)).max() < 1e-7
         assert rmse_in_pixels(reconstruct(tracks, learned), x, rig).max() < 1e-5
-
-    def test_a_calibrated_rig_may_miss_one(self):
-        x, rig, tracks, _ = scene(3)
-        learned = learn_cameras(tracks, self.without(rig, 1))
-        np.testing.assert_allclose(learned.cameras[1].offset, rig.cameras[1].offset, rtol=1e-7)
-        assert learned.cameras[0] == rig.cameras[0]
-
-    def test_two_of_four(self):
-        x, rig, tracks, rng = scene(5, cameras=4)
-        tracks = [track + 0.1 * rng.normal(size=track.shape) for track in tracks]
-        learned = learn_cameras(tracks, self.without(rig.uncalibrated(), 1, 3))
-        assert rmse_in_pixels(reconstruct(tracks, learned), x, rig).max() < 0.3
-
-    def test_it_is_the_position_that_was_wrong(self):
-        _, rig, tracks, _ = scene(6)
-        first, second, third = rig.uncalibrated().cameras
-        moved = replace(third, position=third.position + 20 * rig.cameras[2].scale * third.rows[0])
-        off = np.hstack(residuals(tracks, learn_cameras(tracks, Rig([first, second, moved]))))
-        free = self.without(Rig([first, second, moved]), 2)
-        assert np.abs(off).max() > 1
-        assert np.abs(np.hstack(residuals(tracks, learn_cameras(tracks, free)))).max() < 1e-6
-
-    def test_a_wrong_normal_is_found_beside_it(self):
-        _, rig, tracks, _ = scene(8, cameras=4)
-        start = self.without(rig.uncalibrated(), 3)
-        true = start.cameras[1].normal
-        wrong = rodrigues([0, 0, 1], 0.1) @ true
-        second = replace(start.cameras[1], normal=wrong, normal_error=6.0)
-        first, _, third, fourth = start.cameras
-        found = learn_cameras(tracks, Rig([first, second, third, fourth]))
-        np.testing.assert_allclose(found.cameras[1].normal, true, atol=1e-4)
 
     def test_file(self, small, tmp_path):
         rig = self.without(small[1], 1)
@@ -521,20 +416,6 @@ class TestPosition:
             reconstruct(tracks, loose)
         with pytest.raises(ValueError, match="camera: position must be known, got None"):
             loose.cameras[1].project(x)
-
-
-def test_two_cameras_do_not_see_what_three_do():
-    x = trajectory(np.random.default_rng(6), 200)
-    first, second, third = Rig.around(x).cameras
-    tracks = [camera.project(x) for camera in (first, second, third)]
-    found = learn_cameras(tracks[:2], Rig([first, second]).uncalibrated())
-    np.testing.assert_allclose(reconstruct(tracks[:2], found), x, atol=1e-8 * np.ptp(x))
-    turn = rodrigues(np.cross(first.normal, second.normal), np.deg2rad(5))
-    wrong = replace(second, normal=turn @ second.normal)
-    pair = learn_cameras(tracks[:2], Rig([first, wrong]).uncalibrated())
-    assert np.abs(np.hstack(residuals(tracks[:2], pair))).max() < 1e-6
-    assert np.abs(reconstruct(tracks[:2], pair) - x).max() > 0.02 * np.ptp(x)
-    assert np.abs(np.hstack(residuals(tracks, Rig([*pair.cameras, third])))).max() > 1
 
 
 NOISE = 0.3  # pixels
@@ -566,16 +447,6 @@ def test_a_search_for_cameras_that_ran_out_of_steps(monkeypatch, kind):
     monkeypatch.setattr(calibrate, "adjust", partial(adjust.adjust, most=1))
     (warning,) = vl.learn_cameras(tracks, rig.uncalibrated()).warnings
     assert "the search for the cameras did not converge in 1 evaluations" in warning
-
-
-@pytest.mark.parametrize("every", [9, 4])
-def test_many_outliers_are_told_from_the_others(every):
-    rig, tracks = filmed()
-    clean = vl.learn_cameras(tracks, rig.uncalibrated())
-    tracks[0][::every] += 100
-    found = vl.learn_cameras(tracks, rig.uncalibrated())
-    assert found.warnings == ()
-    assert np.abs(calibration_errors(found, clean)).max() < 3e-3
 
 
 def test_points_that_did_not_settle(monkeypatch):
@@ -613,49 +484,17 @@ def test_warnings_are_no_part_of_a_rig(tmp_path):
     assert vl.Rig.load(tmp_path / "rig.toml").warnings == ()
 
 
-# ------------------------------------------------------------------ Eq. (4), and weak motion
-
-
-@pytest.mark.slow
-def test_ours_is_closer_and_less_biased_than_eq_4():
-    errors = {learn_cameras: [], learn_cameras_eq4: []}
-    for seed in range(30):
-        rng = np.random.default_rng(seed)
-        x = trajectory(rng, 400)
-        truth = Rig.around(x)
-        tracks = [c.project(x) + 4 * rng.normal(size=(400, 2)) for c in truth.cameras]
-        for learn, found in errors.items():
-            learned = learn(tracks, truth.uncalibrated())
-            found.extend(calibration_errors(learned, truth)[1:])
-    joint, paper = map(np.array, errors.values())
-    assert (np.mean(joint**2, axis=0) < np.mean(paper**2, axis=0)).all()
-    # Noise in the regressors shrinks the scale in Eq. (4), not at the least reprojection error.
-    standard_error = joint[:, 0].std() / np.sqrt(len(joint))
-    assert abs(joint[:, 0].mean()) < 3 * standard_error
-    assert paper[:, 0].mean() < -3 * standard_error
-
-
-def test_eq_4_needs_independent_unknown_cameras(small):
+def test_what_eq_4_needs(small):
     _, rig, tracks, _ = small
+    assert learn_cameras_eq4(tracks, rig) is rig
     twin = replace(rig.cameras[1], normal=-rig.cameras[1].normal)
-    rig = Rig([rig.cameras[0], rig.cameras[1], twin])
+    twins = Rig([rig.cameras[0], rig.cameras[1], twin])
     with pytest.raises(ValueError, match=r"Eq. \(4\) needs two independent normals among"):
-        learn_cameras_eq4(tracks, rig.uncalibrated())
-
-
-def test_eq_4_is_orthographic():
+        learn_cameras_eq4(tracks, twins.uncalibrated())
     rig = room(np.random.default_rng(0))
     tracks = [camera.project(walk(np.arange(60))) for camera in rig.cameras]
     with pytest.raises(ValueError, match=r"Eq. \(4\) needs orthographic cameras, got a persp"):
         learn_cameras_eq4(tracks, rig.uncalibrated())
-
-
-def test_what_eq_4_needs(small):
-    _, rig, tracks, _ = small
-    assert learn_cameras_eq4(tracks, rig) is rig
-    lost = Rig([*rig.cameras[:2], replace(rig.cameras[2], position=None)])
-    with pytest.raises(ValueError, match=r"Eq. \(4\) needs all positions, got none of"):
-        learn_cameras_eq4(tracks, lost.uncalibrated())
 
 
 @pytest.fixture
@@ -673,23 +512,15 @@ def motion(first, second, misfit, frames=40):
     return Equations(design, design @ [3, 4] + misfit * waves[:, 2], np.arange(frames))
 
 
-def test_motion_must_be_twice_the_misfit(unknown):
+def test_motion_must_be_twice_the_misfit_and_more_than_rounding(unknown):
     # The misfit counts in pixels: |3 + 4i| = 5 scene units are one.
     np.testing.assert_allclose(_solved(motion(10.0, 2.8, 5.0), unknown, [1]), [3, 4], rtol=1e-12)
     message = r"cameras\[1\], got 1.9 px rms of telling motion against a misfit of 1 px"
     with pytest.raises(ValueError, match=message):
         _solved(motion(10.0, 1.9, 5.0), unknown, [1])
-
-
-def test_in_many_frames_less_motion_tells(unknown):
-    found = _solved(motion(10.0, 1.9, 5.0, 1500), unknown, [1])
-    np.testing.assert_allclose(found, [3, 4], rtol=1e-12)
+    _solved(motion(10.0, 1.9, 5.0, 1500), unknown, [1])  # in many frames less motion tells
     with pytest.raises(ValueError, match="got 1.5 px rms of telling motion"):
         _solved(motion(10.0, 1.5, 5.0, 1500), unknown, [1])
-
-
-def test_exact_motion_must_be_more_than_rounding(unknown):
-    found = _solved(motion(100.0, 1e-5, 0.0), unknown, [1])
-    np.testing.assert_allclose(found, [3, 4], rtol=1e-6)
+    np.testing.assert_allclose(_solved(motion(100.0, 1e-5, 0), unknown, [1]), [3, 4], rtol=1e-6)
     with pytest.raises(ValueError, match=r"must determine scale and angle of cameras\[1\]"):
         _solved(motion(100.0, 5e-8, 0.0), unknown, [1])

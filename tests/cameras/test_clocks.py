@@ -7,28 +7,17 @@ from vidsindy_lite.cameras import Clock, align
 from vidsindy_lite.cameras.clocks import Curve, Footage, Lags, check_clocks, check_lags, check_rates
 
 
-def test_times_that_a_file_contradicts_are_refused(tmp_path):
-    kept = np.delete(np.arange(30.0), [7, 8])
-    Clock.of_videos([30, 30], [kept, np.arange(30.0)], kept / 240)  # slow motion
-    with pytest.raises(ValueError, match="t: must fit the times that the first video's file"):
-        Clock.of_videos([30, 30], [kept, np.arange(30.0)], np.arange(28) / 30)
-
-
 def test_the_times_of_each_track_are_checked():
     tracks = [np.zeros((4, 2)), np.zeros((5, 2))]
     clock = Clock.of_tracks([[0, 1, 2, 4], [0, 0.5, 1.0, 1.5, 3]], tracks)
     assert clock.rates.tolist() == [1, 2]
     assert [frames.tolist() for frames in clock.frames] == [[0, 1, 2, 4], [0, 1, 2, 3, 6]]
+    assert clock.ends.tolist() == [5.0, 3.5]  # by the clock of the first
+    short = Clock.of_tracks([[0, 2, 4], [7]], [np.zeros((3, 2)), np.zeros((1, 2))])
+    assert short.rates.tolist() == [1, 2]
     assert Clock.of_tracks(np.arange(4) / 30, tracks).uneven is None
     with pytest.raises(ValueError, match=r"t: must have shape \(5,\), one per row of tracks\[1\]"):
         Clock.of_tracks([range(4), range(4)], tracks)
-
-
-def test_how_long_videos_take():
-    """By the clock of the first: the second has two frames in each of its frames."""
-    tracks = [np.zeros((4, 2)), np.zeros((5, 2))]
-    clock = Clock.of_tracks([[0, 1, 2, 4], [0, 0.5, 1.0, 1.5, 3]], tracks)
-    assert clock.ends.tolist() == [5.0, 3.5]
 
 
 def test_one_clock_for_all_tracks():
@@ -38,12 +27,6 @@ def test_one_clock_for_all_tracks():
     assert [frames.tolist() for frames in clock.frames] == [[0, 1, 2], [0, 1, 2, 3, 4]]
     with pytest.raises(ValueError, match=r"t: must have shape \(3,\), one per row of tracks\[0\]"):
         Clock.of_tracks(range(4), [np.zeros((3, 2))] * 2)
-
-
-def test_a_track_of_one_frame_has_a_clock():
-    clock = Clock.of_tracks([[0, 2, 4], [7]], [np.zeros((3, 2)), np.zeros((1, 2))])
-    assert clock.rates.tolist() == [1, 2]
-    assert [frames.tolist() for frames in clock.frames] == [[0, 1, 2], [0]]
 
 
 @pytest.mark.parametrize(("off", "even"), [(0.5e-6, True), (2e-6, False)])

@@ -1,7 +1,5 @@
 """Lines of sight against OpenCV, scipy and points found by hand."""
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 import pytest
@@ -91,12 +89,7 @@ def test_one_view_or_none_gives_no_point():
     missing = np.isnan(found).all(axis=1)
     assert np.flatnonzero(missing).tolist() == [3, 5]
     np.testing.assert_allclose(found[~missing], x[~missing], atol=1e-9 * np.ptp(x))
-
-
-@pytest.mark.parametrize("kind", [OrthographicCamera, PerspectiveCamera])
-def test_one_camera_alone_gives_no_point(kind):
-    _, cameras, tracks = scene(kind)
-    assert np.isnan(intersect(cameras, tracks)[0]).all()
+    assert np.isnan(intersect(cameras[:1], tracks[:1])[0]).all()
 
 
 def test_lines_that_meet_behind_a_camera_give_no_point():
@@ -151,15 +144,6 @@ def test_epipolar_equations_leave_out_what_is_not_seen():
     # A camera at the same place sees every line of sight as a point: it cannot disagree.
     twin = PerspectiveCamera(position=known.position, normal=other.normal, scale=1, angle=0)
     assert np.isnan(epipolar_lines(known, seen, twin)[1]).all()
-
-
-def test_the_unit_of_length_does_not_move_an_epipolar_line():
-    _, (known, other, _), (seen, _, _) = scene(*KINDS[1])
-    lines = epipolar_lines(known, seen, other)
-    for unit in (1e-5, 1e5):
-        tiny = [replace(c, position=unit * c.position) for c in (known, other)]
-        for ours, theirs in zip(epipolar_lines(tiny[0], seen, tiny[1]), lines, strict=True):
-            np.testing.assert_allclose(ours, theirs, rtol=1e-6)
 
 
 @pytest.mark.parametrize(("apart", "told"), [(1.3e-6, False), (2e-6, True)])
