@@ -77,9 +77,6 @@ def test_other_libraries_are_other_code(tmp_path, monkeypatch):
     code_hash.cache_clear()
 
 
-# ------------------------------------------------------------------------- what has to be installed
-
-
 def imported(folder):
     """Names of the modules that the code of a folder imports, at any depth."""
     found = set()

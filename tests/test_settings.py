@@ -1,7 +1,7 @@
 """Every notebook holds for other settings than its own, in two each, in its quick profile.
 
-Assertions of a notebook have to test what it says, not the numbers of its default. Two small ones
-run with all tests, the rest by `pytest -m thorough`.
+Assertions of a notebook have to test what it says, not the numbers of its default. A small one
+runs with all tests, the rest by `pytest -m thorough`.
 """
 
 import pytest
@@ -30,13 +30,9 @@ SETTINGS = {
     "13": [{"seed": 1}, {"fps": 60}],
     "14": [{"seed": 1}, {"seed": 2}],
 }
-QUICK = ("01", "10")
+QUICK = SETTINGS["01"][0]
 CASES = [
-    pytest.param(
-        number,
-        one,
-        marks=pytest.mark.slow if number in QUICK else pytest.mark.thorough,
-    )
+    pytest.param(number, one, marks=pytest.mark.slow if one is QUICK else pytest.mark.thorough)
     for number, both in SETTINGS.items()
     for one in both
 ]
