@@ -176,15 +176,6 @@ class TestLearning:
         np.testing.assert_allclose(found[enough], x[enough], atol=1e-8 * np.ptp(x))
         assert np.isnan(found[~enough]).all()
 
-    def test_every_frame_may_miss_a_view(self):
-        _, truth, tracks, _ = scene(1, n=90)
-        for i, track in enumerate(tracks):
-            track[i::3] = np.nan
-        learned = learn_cameras(tracks, truth.uncalibrated())
-        assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
-        with pytest.raises(ValueError, match="common views must give at least 4 equations"):
-            learn_cameras_eq4(tracks, truth.uncalibrated())
-
     def test_known_cameras_are_kept(self, small):
         _, truth, tracks, _ = small
         tracks = [np.round(track) for track in tracks]
@@ -361,17 +352,6 @@ class TestBadTracks:
         ):
             learn(still, rig.uncalibrated())
 
-    def test_motion_that_one_camera_does_not_see(self, small):
-        # Motion along the line of sight of camera 2 leaves it one equation short.
-        x, rig, _, _ = small
-        line = x[:1] + np.linspace(-1, 1, 40)[:, None] * rig.cameras[2].normal
-        start = Rig([*rig.cameras[:2], replace(rig.cameras[2], scale=None, angle=None)])
-        tracks = [camera.project(line) for camera in rig.cameras]
-        centre = replace(start.cameras[2], position=x[0])
-        tracks[2][:] = 255.5
-        with pytest.raises(ValueError, match=r"scale and angle of cameras\[2\], got"):
-            learn_cameras(tracks, Rig([*start.cameras[:2], centre]))
-
 
 class TestPosition:
     """Cameras whose position is not trusted: two more unknowns each."""
@@ -393,13 +373,6 @@ class TestPosition:
             np.testing.assert_allclose(camera.offset, true.offset, atol=1e-6 * np.abs(x).max())
         assert np.abs(calibration_errors(learned, rig)).max() < 1e-7
         assert rmse_in_pixels(reconstruct(tracks, learned), x, rig).max() < 1e-5
-
-    def test_file(self, small, tmp_path):
-        rig = self.without(small[1], 1)
-        rig.save(tmp_path / "rig.toml")
-        assert (tmp_path / "rig.toml").read_text().count("position") == 2
-        assert Rig.load(tmp_path / "rig.toml") == rig
-        assert len({*rig.cameras, *Rig.load(tmp_path / "rig.toml").cameras}) == 3
 
     def test_what_cannot_be_learned_is_said(self, small):
         x, rig, tracks, _ = small
@@ -466,15 +439,6 @@ def test_lags_that_did_not_settle(monkeypatch):
     assert "the search for the lags of the videos did not converge" in found.warnings[0]
 
 
-def test_lags_at_which_there_are_no_cameras():
-    rig, tracks = filmed()
-    tracks[1][:60], tracks[2][60:] = np.nan, np.nan
-    tracks[0][::2] = np.nan
-    tracks[0][1:115] = np.nan
-    found = vl.learn_lags(tracks, rig.uncalibrated())
-    assert not found.agree
-
-
 def test_warnings_are_no_part_of_a_rig(tmp_path):
     rig, _ = filmed()
     doubtful = replace(rig, warnings=("no",))
@@ -487,6 +451,9 @@ def test_warnings_are_no_part_of_a_rig(tmp_path):
 def test_what_eq_4_needs(small):
     _, rig, tracks, _ = small
     assert learn_cameras_eq4(tracks, rig) is rig
+    gaps = [np.where(np.arange(40)[:, None] % 3 == i, np.nan, t) for i, t in enumerate(tracks)]
+    with pytest.raises(ValueError, match="common views must give at least 4 equations"):
+        learn_cameras_eq4(gaps, rig.uncalibrated())
     twin = replace(rig.cameras[1], normal=-rig.cameras[1].normal)
     twins = Rig([rig.cameras[0], rig.cameras[1], twin])
     with pytest.raises(ValueError, match=r"Eq. \(4\) needs two independent normals among"):

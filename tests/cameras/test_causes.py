@@ -111,14 +111,6 @@ def test_what_was_measured_with_an_error_is_not_blamed():
     assert explain(tracks, exact, learn_cameras(tracks, exact)) is not None
 
 
-def test_residuals_that_follow_the_motion():
-    rng = np.random.default_rng(14)
-    rig = room(rng, 4)
-    assert not smooth(seen(rng, rig, noise=5.0), rig)
-    tracks, wrong = flawed(rng, "normal")
-    assert smooth(tracks, wrong)
-
-
 def test_nothing_seen_is_nothing_wrong():
     rig = room(np.random.default_rng(0), 3)
     blind = [np.full((20, 2), np.nan) for _ in rig.cameras]

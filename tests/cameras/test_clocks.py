@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.cameras import Clock, align
+from vidsindy_lite.cameras import Clock
 from vidsindy_lite.cameras.clocks import Curve, Footage, Lags, check_clocks, check_lags, check_rates
 
 
@@ -88,16 +88,6 @@ def test_everything_counts_from_the_first():
     assert second.tolist() == list(range(0, 16, 2))
 
 
-def test_only_differences_of_a_clock_count():
-    ticks = np.arange(9) + 40.0, np.array([0, 1, 3, 4, 5, 7, 8, 9]) - 100.0
-    ours = align(TRACKS, (0, 0), clocks=ticks)
-    theirs = align(TRACKS, (0, 0), clocks=[tick - tick[0] for tick in ticks])
-    np.testing.assert_array_equal(ours, theirs)
-    np.testing.assert_array_equal(ours[0], TRACKS[0])
-    np.testing.assert_array_equal(ours[1][[0, 1, 3, 4, 5, 7, 8]], TRACKS[1][:7])
-    assert np.isfinite(ours[1]).all()  # one frame that was dropped is filled in
-
-
 def test_a_frame_is_that_of_the_instant():
     lags = Lags(np.array([0, 2.0, -3.5]), np.array([1, 1, 2.0]), np.zeros(3), 0.0)
     assert [lags.frame_at(i, 10) for i in range(3)] == [10, 8, 27]
@@ -106,17 +96,6 @@ def test_a_frame_is_that_of_the_instant():
     assert [dropped.frame_at(1, instant) for instant in (1, 4, 8)] == [0, 2, 5]
     faster = Lags(np.array([0, 1.0]), np.array([1, 2.0]), np.zeros(2), 0.0, clocks=ticks)
     assert [faster.frame_at(1, instant) for instant in (1, 3, 5)] == [0, 3, 6]
-
-
-def test_a_slope_is_from_the_frame_before_to_the_frame_after():
-    t = np.arange(12.0)
-    curve = Curve(np.column_stack([t**2, 3 - 4 * t]), t)
-    inside = np.array([1, 4.5, 10])
-    slopes = np.column_stack([2 * inside, np.full(3, -4)])
-    np.testing.assert_allclose(curve.slope(inside), slopes, atol=1e-9)
-    # At an end from it to the frame beside it; nowhere, if the target is in no frame.
-    np.testing.assert_allclose(curve.slope(np.array([0.0, 11])), [[1, -4], [21, -4]], atol=1e-9)
-    assert not Curve(np.full((4, 2), np.nan), np.arange(4.0)).slope(inside).any()
 
 
 @pytest.mark.parametrize("rate", [1.0, 2.0])

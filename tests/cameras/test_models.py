@@ -32,22 +32,6 @@ def camera():
     )
 
 
-def test_a_changed_camera_has_matrices_of_its_own(camera):
-    before = camera.matrix
-    moved = replace(camera, position=(0, 0, 5))
-    assert not np.array_equal(moved.matrix, before)
-    np.testing.assert_array_equal(
-        camera.calibrated(0.02 * np.exp(0.3j)).matrix, before
-    )  # position and normal alone
-    flat = vl.OrthographicCamera(normal=(0.1, 0.2, 1), scale=0.01, angle=0.4)
-    first, second = flat.placed(np.array([1.0, 2.0])), flat.placed(np.array([3.0, 4.0]))
-    np.testing.assert_allclose(first.matrix[:2, 3], [-1, -2])
-    np.testing.assert_allclose(second.matrix[:2, 3], [-3, -4])
-    again = first.placed(np.array([5.0, 6.0]))
-    np.testing.assert_allclose(again.offset, [5, 6])
-    np.testing.assert_allclose(again.position @ again.normal, 0, atol=1e-12)
-
-
 def test_a_used_camera_can_be_pickled(camera):
     _ = camera.matrix
     assert pickle.loads(pickle.dumps(camera)) == camera
@@ -240,15 +224,6 @@ def test_projection_is_the_nearest_point_of_the_plane(x, normal, d):
     assert normal @ foot + d == pytest.approx(0, abs=1e-10)
     np.testing.assert_allclose(np.cross(x - foot, normal / length), 0, atol=1e-10 / length)
     np.testing.assert_allclose(plane_projection(foot, normal, d), foot, atol=1e-10 / length)
-
-
-@given(vectors(100.0), directions())
-def test_offset_is_the_signed_distance_to_the_turned_coordinate_planes(position, normal):
-    x_axis, y_axis, z_axis = rotation_to_z(normal)
-    to_yz = signed_distance(position, *plane_through((0, 0, 0), y_axis, z_axis))
-    to_xz = signed_distance(position, *plane_through((0, 0, 0), z_axis, x_axis))
-    offset = OrthographicCamera(position=position, normal=normal).offset
-    np.testing.assert_allclose(offset, [to_yz, to_xz], atol=1e-11)
 
 
 def test_planes_and_distances_by_hand():

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import align, disagreement, learn_lags, list_lags
 from vidsindy_lite.cameras import synchronise as synchrony
-from vidsindy_lite.cameras.adjust import PARTS, SIZE, adjust
+from vidsindy_lite.cameras.adjust import SIZE, adjust
 from vidsindy_lite.cameras.clocks import Footage
 from vidsindy_lite.cameras.synchronise import Timing
 
@@ -120,15 +120,6 @@ def test_errors_are_those_of_least_squares(motion):
     np.testing.assert_allclose(found.errors[1:], np.sqrt(np.diag(covariance)), rtol=0.1)
 
 
-def test_calibrated_rig_and_outliers(motion):
-    tracks = filmed(motion, (250, 250, 250), (0, 7, -4))
-    for i, track in enumerate(tracks):
-        track[20 + i :: 50] += 60  # jumps of the tracker, in up to six frames of a hundred
-    found = learn_lags(tracks, motion[1])
-    np.testing.assert_allclose(found.frames, (0, 7, -4), atol=0.02)
-    assert found.errors.max() < 0.01
-
-
 def test_a_camera_without_a_position(motion):
     first, second, third = motion[1].uncalibrated().cameras
     rig = vl.Rig([first, replace(second, position=None), third])
@@ -163,23 +154,6 @@ def test_a_target_that_hardly_moves_tells_no_lag():
         "the lag of video 2", "the lag of video 3",
     ]  # fmt: skip
     assert all("the target moves too little or too slowly" in w for w in found.warnings)
-
-
-def test_noise_of_the_tracks_is_no_reason_to_look_for_other_lags(motion, monkeypatch):
-    """However large; what follows the motion is, however small."""
-    tracks = filmed(motion, (250,) * 3, (0, 0, 0), noise=1.5)
-    searched = []
-    monkeypatch.setattr(synchrony, "_searched", lambda *_: searched.append(1) or (False, []))
-    found = learn_lags(tracks, motion[1])
-    assert found.residual > 1
-    assert found.agree
-    assert found.frames.tolist() == [0, 0, 0]
-    assert not searched
-    first, second, third = motion[1].cameras
-    turned = replace(second, normal=second.normal + 0.02 * second.rows[0])
-    quiet = filmed(motion, (250,) * 3, (0, 0, 0))
-    learn_lags(quiet, vl.Rig([first, turned, third]))
-    assert searched
 
 
 def test_lags_that_are_given_are_the_start(motion):
@@ -302,13 +276,6 @@ def test_noise_tells_no_lag_and_motion_does(motion):
         assert learn_lags(tracks, rig).agree == told
 
 
-def test_outliers_do_not_count_as_disagreement(motion):
-    tracks = filmed(motion, (250,) * 3, (0, 0, 0))
-    quiet = disagreement(tracks, motion[1])
-    tracks[0][::20] += 50
-    assert max(disagreement(tracks, motion[1])) < 1.5 * max(quiet)
-
-
 def test_lags_as_text():
     assert list_lags(np.array([0.0, 7.0, -12.504, -1e-9])) == "0, 7, -12.5, 0"
 
@@ -410,24 +377,6 @@ def test_lags_and_rolling_shutters_are_told_apart():
     np.testing.assert_allclose(found.frames, lags, atol=0.1)
 
 
-LAG, DRIFT = PARTS["lag"][0], PARTS["drift"][0]
-
-
-def fitted(motion, lags=(0, 0, 0), frames=120, rates=(1, 1, 1), **more):
-    """A known rig, and nothing known of lags."""
-    tracks = filmed(motion, (frames,) * 3, lags, rates, **more)
-    errors = np.zeros((3, SIZE))
-    errors[1:, LAG] = np.inf
-    return Timing.of(adjust(Footage.of(tracks), motion[1].cameras, errors))
-
-
-def missing(timing, misses):
-    """The same, if residuals were these."""
-    fit = replace(timing.fit)
-    fit.misses, fit.weights = misses, np.ones(len(misses))
-    return Timing(fit)
-
-
 @pytest.mark.parametrize(
     ("size", "memory", "agrees"),
     [(0.1, 0.0, True), (2.0, 0.0, True), (1e3, 0.0, False), (0.01, 0.9, False), (1.0, 0.35, True),
@@ -437,17 +386,8 @@ def test_noise_agrees_and_what_persists_does_not(motion, size, memory, agrees):
     """Noise however large, unless it is gross; what is like the next frame's, if it is small."""
     rng = np.random.default_rng(0)
     misses = size * np.hstack([dependent(rng, 400, memory) for _ in range(3)])
-    assert missing(fitted(motion), misses / 2).agrees is agrees
-
-
-def test_a_clock_that_drifts_clearly_is_freed_and_no_other(motion):
-    """By half a frame in 250, twenty times its error; the third one's stays even."""
-    rate = 1 + 0.5 / 250
-    plain = fitted(motion, frames=250, rates=(1, rate, 1))
-    drifted = plain.drifted()
-    drift = drifted.fit.change[:, DRIFT]
-    assert drift[1] == pytest.approx(-0.5, rel=0.05)
-    assert drift[[0, 2]].tolist() == [0, 0]
-    assert drifted.fit.left() < 0.7 * plain.fit.left()
-    even = fitted(motion, frames=250)
-    assert even.drifted() is even
+    tracks = filmed(motion, (120,) * 3, (0, 0, 0))
+    fit = adjust(Footage.of(tracks), motion[1].cameras, np.zeros((3, SIZE)))
+    fit = replace(Timing.of(fit).fit)
+    fit.misses, fit.weights = misses / 2, np.ones(len(misses))
+    assert Timing(fit).agrees is agrees

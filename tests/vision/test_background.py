@@ -8,7 +8,6 @@ from vidsindy_lite.vision.background import (
     BackgroundModel,
     Blob,
     _unrest,
-    changes,
     displacement,
     median_image,
     sample_frames,
@@ -34,18 +33,6 @@ def test_the_median_of_images():
     before = images.copy()
     np.testing.assert_array_equal(median_image(images), np.median(images, axis=0))
     np.testing.assert_array_equal(images, before)
-
-
-@pytest.mark.parametrize("shift", [(0.1, 0.0), (0.12, -0.16)])
-def test_a_displaced_view_is_measured(texture, shift):
-    slope = np.gradient(texture, axis=(1, 0))
-    rng = np.random.default_rng(1)
-    change = -(shift[0] * slope[0] + shift[1] * slope[1])
-    changes = [(change + rng.normal(0, 0.1, change.shape)).astype(np.float32)] * 3
-    found = displacement(texture, changes, 1e3)
-    np.testing.assert_allclose(found, 4 * np.hypot(*shift), rtol=0.05)  # in pixels of the video
-    still = [rng.normal(0, 1, texture.shape).astype(np.float32) for _ in range(5)]
-    np.testing.assert_array_equal(displacement(texture, still, 1e3), 0)
 
 
 def test_one_push_or_one_change_of_light_is_unrest(texture):
@@ -82,12 +69,6 @@ def test_distances_of_views_from_the_commonest_one():
     assert np.isinf(view_distances([None, None])).all()
     many = view_distances([*[blob()] * 250, blob((0, 0.3, 0, 0))])
     np.testing.assert_allclose(many, [*[0] * 250, 10])
-
-
-def test_views_beside_a_distant_one_must_be_twice_as_close():
-    distance = np.array([0.1, 0.6, 0.7, 2.0, 0.6, 0.4, 0.6, 0.9, 0.2, np.inf, 0.45])
-    expected = [True, False, False, False, False, True, True, True, True, False, True]
-    np.testing.assert_array_equal(whole_views(distance), expected)
 
 
 def learned(samples):
@@ -156,18 +137,6 @@ def test_what_has_five_times_the_area_of_the_target_or_a_fifth_is_none(plain, si
     assert (found is not None) == is_target
 
 
-def test_a_target_beside_ground_of_its_own_colour_has_no_shape():
-    frames = np.array([squares((4 + 5 * i, 4 + 3 * i, 16)) for i in range(20)])
-    frames[:, :, 56:60] = np.add(TARGET, 3)  # a stripe, on which the target cannot be told
-    model = learned(frames)
-    frame = squares((40, 40, 16))
-    frame[:, 56:60] = np.add(TARGET, 3)
-    assert model.measure(frame, np.array([47.5, 47.5]), 14).shape is None
-    frame = squares((20, 40, 16))
-    frame[:, 56:60] = np.add(TARGET, 3)
-    assert model.measure(frame, np.array([27.5, 47.5]), 14).shape is not None
-
-
 def test_a_target_of_several_colours_is_told():
     def film(width):
         frames = [squares((4 + 5 * i, 4 + 3 * i, 16)) for i in range(20)]
@@ -178,14 +147,6 @@ def test_a_target_of_several_colours_is_told():
     assert not learned(film(0)).several_colours
     assert not learned(film(4)).several_colours
     assert learned(film(6)).several_colours
-
-
-@pytest.mark.parametrize("step", [0, 4])
-def test_a_camera_that_moves_now_and_then_does_not_rest(step):
-    scene = render([[np.nan, np.nan]], Scene("bricks", image_size=(140, 96)), 1)
-    scene = cv2.GaussianBlur(next(scene), (0, 0), 2)
-    samples = np.array([scene[:, step * (k == 9) :][:, :128] for k in range(21)])
-    assert BackgroundModel(samples).camera_rests == (step == 0)
 
 
 @pytest.mark.parametrize(("left", "top"), [(40, 24), (112, 80)])
@@ -216,18 +177,3 @@ def test_a_part_of_a_target_that_is_in_the_background_shows(reach, shows):
     model = BackgroundModel(samples)
     model.learn_target(samples)
     assert model.shows_target() == shows
-
-
-@pytest.mark.parametrize("factor", [0.5, 1.0, 1.5])
-def test_what_is_saturated_differs_from_what_is_darker_only(factor):
-    light = np.full(3, factor, np.float32)
-    ground = np.full((1, 4, 3), 255, np.uint8)
-    grey = np.array([255.0, 200, 130, 20])
-    frame = grey.astype(np.uint8)[None, :, None].repeat(3, axis=2)
-    found = changes(frame, ground, light)[0, :, 0]
-    least = min(255 * factor, 255)  # the least that the ground may be in that light
-    np.testing.assert_allclose(found, np.minimum(grey - least, 0), atol=1e-3)
-    # What is not saturated differs from what is brighter, too, as far as a frame shows that.
-    wall = np.full((1, 4, 3), 200, np.uint8)
-    found = changes(frame, wall, light)[0, :, 0]
-    np.testing.assert_allclose(found, grey - min(200 * factor, 255), atol=1e-3)

@@ -4,12 +4,11 @@ import json
 
 import numpy as np
 import pytest
-import torch
 from tiny_onnx import BOX, write_red_detector
 
 from vidsindy_lite.vision import training
 from vidsindy_lite.vision.detector import LEAST, WEIGHTS, LearnedDetector, OnnxDetector, detections
-from vidsindy_lite.vision.network import Network, fused
+from vidsindy_lite.vision.network import Network
 from vidsindy_lite.vision.rendering import BACKGROUNDS, SHAPES, Scene, render
 
 LOG = json.loads(WEIGHTS.with_suffix(".json").read_text())
@@ -111,22 +110,3 @@ def test_bad_onnx_files(tmp_path):
         LearnedDetector(tmp_path / "none.pt")
     with pytest.raises(ValueError, match=r"shape \(1, 4 \+ classes, anchors\), got \(1, 4, 64\)"):
         thin.predict(np.zeros((64, 64, 3), np.uint8))
-
-
-def test_an_untrained_network_is_sure_of_nothing():
-    torch.manual_seed(0)
-    with torch.inference_mode():
-        predictions = Network().eval()(torch.rand(2, 3, 64, 96))
-    assert predictions.shape == (2, 5, 16 * 24)
-    assert predictions[:, 4].sigmoid().max() < 0.1
-    assert Network().what[-1].bias.sigmoid().item() == pytest.approx(0.01)
-
-
-def test_fused_normalisation_changes_no_value():
-    torch.manual_seed(0)
-    network, images = Network(), torch.rand(4, 3, 64, 64)
-    network(images)  # in training mode: moves the running means
-    network.eval()
-    with torch.inference_mode():
-        plain = network(images)
-        torch.testing.assert_close(fused(network)(images), plain, rtol=1e-4, atol=1e-4)

@@ -64,20 +64,6 @@ def test_a_large_ball_that_never_leaves_its_own_ground(tmp_path):
 ROUND = [120, 100] + 70 * np.column_stack([np.cos(ANGLE), -np.sin(ANGLE)])
 
 
-def test_a_mark_on_a_wheel_whose_tyre_differs_from_the_ground_all_the_time(tmp_path):
-    grey = np.random.default_rng(1).uniform(30, 150, 60)
-
-    def draw(image, i):
-        for k, level in enumerate(grey):
-            start = -np.degrees(ANGLE[i]) + 6 * k
-            cv2.ellipse(image, (120, 100), (70, 70), 0, start, start + 6, (level,) * 3, 14)
-        disc(image, ROUND[i], 7, (110, 230, 40))
-        return image
-
-    _, error = followed(tmp_path, 1, (240, 200), ROUND, draw)
-    assert np.nanpercentile(error, 95) < 1.5
-
-
 @pytest.mark.parametrize("mixed", [0.0, 0.7])
 def test_a_colour_that_the_film_shows_mixed_with_its_ground_is_not_lost(tmp_path, mixed):
     def draw(image, i):

@@ -12,22 +12,7 @@ from vidsindy_lite.vision.refining import (
     fitting,
     hidden,
     scatter,
-    swapped,
 )
-
-
-@pytest.mark.parametrize("factor", [3.0, 1 / 3])
-def test_what_is_larger_or_smaller_at_once_and_remains_so_is_something_else(factor):
-    areas = np.linspace(100, 150, 40)
-    frames = np.arange(40)
-    assert swapped(frames, areas) is None
-    areas[20:] *= factor
-    assert swapped(frames, areas) == 20
-    assert swapped(np.where(frames < 20, frames, frames + 20), areas) is None  # nobody looked
-    assert swapped(np.where(frames < 20, frames, frames + 6), areas) == 20
-    areas[22:] /= factor
-    assert swapped(frames, areas) is None
-
 
 GROUND = np.full((60, 80, 3), (60, 90, 120), np.uint8)
 
@@ -125,15 +110,6 @@ def test_what_is_far_off_the_line_from_ground_to_target_has_another_colour(contr
     box = (28, 18, 26, 26)  # of which its blurred rim is a part that is no test
     area = look(painted((box, GROUND[0, 0] + red + green)), box, GROUND[0, 0] + red).area
     assert area > 0.9 * 26**2 if same else area < 0.7 * 26**2
-
-
-def test_what_differs_from_the_ground_the_other_way_round_is_another_colour():
-    ground, box = GROUND[0, 0].astype(int), (30, 20, 20, 15)
-    for width, both in ((10, 300), (18, 270)):  # a tenth of another colour is no part of it
-        rest = ((30 + width, 20, 20 - width, 15), ground // 10)
-        view = look(painted(((30, 20, width, 15), 2 * ground), rest), box, 2 * ground)
-        assert view.area == pytest.approx(15 * width, rel=0.1)
-        assert view.whole.area == pytest.approx(both, rel=0.05)
 
 
 @pytest.mark.parametrize(

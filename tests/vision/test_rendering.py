@@ -76,16 +76,6 @@ def test_a_restless_background_moves_behind_the_target():
             next(render_restless(track, scene, bad))
 
 
-def test_size_variation_keeps_the_centroid():
-    track = np.tile([48.3, 40.6], (40, 1))
-    scene = Scene("plain", "irregular", 24, size_variation=0.4, image_size=SMALL)
-    empty = next(render([[np.nan, np.nan]], scene))
-    looks = [drawn_centroid_and_area(f, empty, "red") for f in render(track, scene)]
-    assert np.abs([c - track[0] for c, _ in looks]).max() < 0.02
-    areas = np.array([a for _, a in looks])
-    assert areas.max() / areas.min() > 3
-
-
 def test_shapes_map_the_outline_and_keep_the_centroid():
     track = np.tile([48.3, 40.6], (3, 1))
     shapes = np.array([np.eye(2), [[1.5, 0], [0, 1]], [[1.2, 0.3], [0.3, 0.8]]])
@@ -171,15 +161,6 @@ def test_seeds_are_whole_numbers(tmp_path, seed):
         render_video(tmp_path / "clip.mkv", [[40, 40]], Scene(), seed=seed)
     with pytest.raises(ValueError, match="rng: must be an integer of at least 0, got"):
         Scene.random(seed)
-
-
-def test_masked_rows_of_a_track_are_frames_without_target():
-    scene = Scene("plain", image_size=SMALL)
-    masked = np.ma.masked_array([[40, 40], [50, 40]], mask=[[0, 0], [0, 1]])
-    seen, hidden = render(masked, scene)
-    empty = next(render([[np.nan, np.nan]], scene))
-    assert not np.array_equal(seen, empty)
-    assert np.array_equal(hidden, empty)
 
 
 @settings(max_examples=30)
