@@ -237,10 +237,6 @@ def test_notebook(path, gate):
     assert gate(path) == []
 
 
-def test_every_executed_half_has_its_source():
-    assert orphan_problems(ROOT / "notebooks") == []
-
-
 KEYS = {"id", "kind", "notebook", "caption", "tolerance", "rows", "numbers", "words"}
 
 
@@ -267,6 +263,7 @@ def test_records_are_of_our_notebooks_and_hold_no_hash(folder):
     assert {record["notebook"] for record in records} <= {path.stem for path in NOTEBOOKS}
     assert {key for record in records for key in record} <= KEYS
     assert folder == REFERENCES or folder_problems(folder) == []
+    assert orphan_problems(ROOT / "notebooks") == []
 
 
 def run_problems(path, folder, cache, references=REFERENCES, seed=None):
@@ -475,12 +472,6 @@ def named(tables):
     return number_problems(tables / "01_first.py", tables / "quick", tables / "committed")
 
 
-def test_numbers_of_the_same_quick_run_agree(tables):
-    edit(tables / "quick" / "found.json", "0.5", "0.51")
-    edit(tables / "quick" / "found.json", "3.0", "9.0")
-    assert named(tables) == []
-
-
 @pytest.mark.parametrize(
     ("folder", "old", "new", "place"),
     [
@@ -490,14 +481,12 @@ def test_numbers_of_the_same_quick_run_agree(tables):
     ],
 )
 def test_numbers_of_another_quick_run_are_named(tables, folder, old, new, place):
+    edit(tables / "quick" / "found.json", "3.0", "9.0")  # seconds
+    assert named(tables) == []
     edit(tables / folder / "found.json", old, new)
     (problem,) = named(tables)
     assert problem.startswith(f"found: {place}")
-
-
-@pytest.mark.parametrize("folder", ["committed", "quick"])
-def test_a_table_on_one_side_only_is_named(tables, folder):
-    (tables / folder / "found.json").unlink()
+    (tables / folder / "found.json").unlink()  # on one side only
     assert [problem.partition(":")[0] for problem in named(tables)] == ["found"]
 
 

@@ -43,174 +43,174 @@ def small():
     return scene(7, n=40)
 
 
-class TestRig:
-    def test_reads_a_file_written_by_hand(self, tmp_path):
-        path = tmp_path / "rig.toml"
-        path.write_text(
-            "[[camera]]\nposition = [0, 0, 10]\nnormal = [0, 0, 1]\nscale = 1\nangle = 0.5\n"
-            "[[camera]]\nposition = [10, 0.0, 0]\nnormal = [2, 0, 0]\nimage_size = [640, 480]\n"
-        )
-        assert Rig.load(path) == Rig(
-            [
-                OrthographicCamera(position=(0, 0, 10), normal=(0, 0, 1), scale=1.0, angle=0.5),
-                OrthographicCamera(position=(10, 0, 0), normal=(1, 0, 0), image_size=(640, 480)),
-            ]
-        )
-
-    @pytest.mark.parametrize(
-        ("text", "message"),
-        [
-            ("[[camera]", "must be a TOML file"),
-            ("", r"must hold \[\[camera\]\] tables and at most a distance, got \[\]"),
-            ("[camera]\nnormal = [0, 0, 1]", r"must hold \[\[camera\]\] tables"),
-            ("unit = 'mm'\n[[camera]]", r".* at most a distance, got \['camera', 'unit'\]"),
-            ("camera = [1, 2]", "camera 0: must be a table"),
-            ("[[camera]]\nposition = [0, 0, 1]", "camera 0: normal: must be given, got keys posi"),
-            (f"{PLACED}model = 'fisheye'", "camera 0: model: must be one of orthographic"),
-            (f"{PLACED}distortion = [0.1]", "camera 0: distortion: must be one of model, target"),
-            (f"{PLACED}zoom = 2", "camera 0: zoom: must"),
-            (f"{PLACED}{PLACED}scale = -1\nangle = 0", "camera 1: scale: must be positive, got -1"),
-            (PLACED + PLACED, "cameras: must have at least two independent normals"),
-        ],
+def test_reads_a_file_written_by_hand(tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text(
+        "[[camera]]\nposition = [0, 0, 10]\nnormal = [0, 0, 1]\nscale = 1\nangle = 0.5\n"
+        "[[camera]]\nposition = [10, 0.0, 0]\nnormal = [2, 0, 0]\nimage_size = [640, 480]\n"
     )
-    def test_bad_file_names_file_camera_and_key(self, tmp_path, text, message):
-        path = tmp_path / "broken.toml"
-        path.write_text(text)
-        with pytest.raises(ValueError, match=rf"^rig: {message}.*broken\.toml'"):
-            Rig.load(path)
-        with pytest.raises(FileNotFoundError, match=r"^rig: no such file, got '.*nowhere\.toml'$"):
-            Rig.load(tmp_path / "nowhere.toml")
-
-    @pytest.mark.parametrize("second", [(0, 0, -1), (1e-9, 0, 1)])
-    def test_parallel_normals(self, second):
-        normals = ((0, 0, 1), second, (0, 0, 2))
-        cameras = [OrthographicCamera(position=(0, 0, 0), normal=n) for n in normals]
-        with pytest.raises(ValueError, match="cameras: must have at least two independent normals"):
-            Rig(cameras)
-
-    def test_needs_two_cameras(self, small):
-        with pytest.raises(ValueError, match="rig: must hold two or more cameras, got 1"):
-            check_learnable(Rig(small[1].cameras[:1]))
-        with pytest.raises(ValueError, match="cameras: must be one or more, got none"):
-            Rig([])
-        for none in (None, small[1].cameras[0], 3):
-            with pytest.raises(ValueError, match="cameras.*: must be"):
-                Rig(none)
-        with pytest.raises(ValueError, match=r"cameras\[0\]: must be of type Camera, got 1"):
-            Rig([1, 2])
-
-    def test_uncalibrated(self, small):
-        _, rig, _, _ = small
-        start = rig.uncalibrated(keep=2)
-        assert [camera.is_calibrated for camera in start.cameras] == [False, False, True]
-        assert start.cameras[2] == rig.cameras[2]
-        with pytest.raises(ValueError, match="keep: must be an index of 3 cameras, got 3"):
-            rig.uncalibrated(keep=3)
-        for keep in (1.5, -1, "a"):
-            with pytest.raises(ValueError, match="keep: must be an integer of at least 0, got"):
-                rig.uncalibrated(keep)
-        for name, use in (("rig", Rig.load), ("path", rig.save)):
-            with pytest.raises(ValueError, match=f"{name}: must be the name of a file, got None"):
-                use(None)
-
-    @given(SEEDS, st.sampled_from([(512, 512), (640, 480), (100, 300)]))
-    @settings(max_examples=10)
-    def test_around_fills_the_images(self, seed, image_size):
-        x = trajectory(np.random.default_rng(seed), 200)
-        rig = Rig.around(x, image_size=image_size)
-        half = (np.array(image_size) - 1) / 2
-        for camera in rig.cameras:
-            used = np.abs(camera.project(x) - half) / half
-            assert used.max() == pytest.approx(0.85, abs=1e-6)
-        normals = np.array([camera.normal for camera in rig.cameras])
-        assert np.linalg.svd(normals, compute_uv=False)[-1] > 0.3
-        up = [np.diff(c.project([[0, 0, 0], [0, 0, 1]]), axis=0)[0] for c in rig.cameras]
-        roll = [np.rad2deg(np.arctan2(-right, -down)) for right, down in up]
-        np.testing.assert_allclose(roll, [6, -9, 14], atol=1e-9)
-
-    def test_around_needs_a_scene(self):
-        with pytest.raises(ValueError, match="x: must hold at least two different points, got"):
-            Rig.around(np.full((5, 3), np.nan))
-        with pytest.raises(ValueError, match=r"got 1 without NaN in shape \(99, 3\)$"):
-            Rig.around(np.ones((99, 3)))
-        for size in (512, "ab", (1, 512)):
-            with pytest.raises(ValueError, match="image_size: must be two integers of at least 2"):
-                Rig.around(np.eye(3), image_size=size)
+    assert Rig.load(path) == Rig(
+        [
+            OrthographicCamera(position=(0, 0, 10), normal=(0, 0, 1), scale=1.0, angle=0.5),
+            OrthographicCamera(position=(10, 0, 0), normal=(1, 0, 0), image_size=(640, 480)),
+        ]
+    )
 
 
-class TestLearning:
-    @pytest.mark.parametrize("learn", [learn_cameras, learn_cameras_eq4])
-    @given(SEEDS, st.integers(0, 2))
-    @settings(max_examples=8)
-    def test_exact_pixels_give_exact_cameras(self, learn, seed, keep):
-        x, truth, tracks, _ = scene(seed)
-        learned = learn(tracks, truth.uncalibrated(keep))
-        assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
-        np.testing.assert_allclose(reconstruct(tracks, learned), x, atol=1e-9 * np.ptp(x))
-
-    @given(SEEDS, st.integers(0, 2))
-    @settings(max_examples=5)
-    def test_integer_pixels_give_a_third_of_a_pixel(self, seed, keep):
-        x, truth, tracks, _ = scene(seed)
-        tracks = [np.round(track) for track in tracks]
-        learned = learn_cameras(tracks, truth.uncalibrated(keep))
-        assert rmse_in_pixels(reconstruct(tracks, learned), x, truth).max() <= 0.35
-
-    @given(SEEDS, st.integers(2, 6), st.data())
-    @settings(max_examples=8)
-    def test_any_number_of_cameras_with_missing_views(self, seed, cameras, data):
-        x, truth, tracks, rng = scene(seed, n=60, cameras=cameras)
-        known = data.draw(st.integers(1, cameras))
-        start = Rig(
-            camera if i < known else replace(camera, scale=None, angle=None)
-            for i, camera in enumerate(truth.cameras)
-        )
-        seen = rng.random((60, cameras)) < 0.8
-        seen[:4] = True
-        for i, track in enumerate(tracks):
-            track[~seen[:, i]] = np.nan
-        learned = learn_cameras(tracks, start)
-        assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
-        found = reconstruct(tracks, learned)
-        enough = seen.sum(axis=1) >= 2
-        np.testing.assert_allclose(found[enough], x[enough], atol=1e-8 * np.ptp(x))
-        assert np.isnan(found[~enough]).all()
-
-    def test_known_cameras_are_kept(self, small):
-        _, truth, tracks, _ = small
-        tracks = [np.round(track) for track in tracks]
-        assert learn_cameras(tracks, truth) == truth
-        assert learn_cameras(tracks, truth.uncalibrated(1)).cameras[1] == truth.cameras[1]
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[[camera]", "must be a TOML file"),
+        ("", r"must hold \[\[camera\]\] tables and at most a distance, got \[\]"),
+        ("[camera]\nnormal = [0, 0, 1]", r"must hold \[\[camera\]\] tables"),
+        ("unit = 'mm'\n[[camera]]", r".* at most a distance, got \['camera', 'unit'\]"),
+        ("camera = [1, 2]", "camera 0: must be a table"),
+        ("[[camera]]\nposition = [0, 0, 1]", "camera 0: normal: must be given, got keys posi"),
+        (f"{PLACED}model = 'fisheye'", "camera 0: model: must be one of orthographic"),
+        (f"{PLACED}distortion = [0.1]", "camera 0: distortion: must be one of model, target"),
+        (f"{PLACED}zoom = 2", "camera 0: zoom: must"),
+        (f"{PLACED}{PLACED}scale = -1\nangle = 0", "camera 1: scale: must be positive, got -1"),
+        (PLACED + PLACED, "cameras: must have at least two independent normals"),
+    ],
+)
+def test_bad_file_names_file_camera_and_key(tmp_path, text, message):
+    path = tmp_path / "broken.toml"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=rf"^rig: {message}.*broken\.toml'"):
+        Rig.load(path)
+    with pytest.raises(FileNotFoundError, match=r"^rig: no such file, got '.*nowhere\.toml'$"):
+        Rig.load(tmp_path / "nowhere.toml")
 
 
-class TestReconstruction:
-    def test_two_parallel_views_are_not_enough(self, small):
-        _, rig, _, rng = small
-        twin = replace(rig.cameras[0], normal=-rig.cameras[0].normal)
-        rig = Rig([rig.cameras[0], twin, rig.cameras[1]])
-        tracks = [rng.uniform(0, 511, size=(3, 2)) for _ in range(3)]
-        tracks[2][0] = np.nan
-        assert np.isnan(reconstruct(tracks, rig)).all(axis=1).tolist() == [True, False, False]
+@pytest.mark.parametrize("second", [(0, 0, -1), (1e-9, 0, 1)])
+def test_parallel_normals(second):
+    normals = ((0, 0, 1), second, (0, 0, 2))
+    cameras = [OrthographicCamera(position=(0, 0, 0), normal=n) for n in normals]
+    with pytest.raises(ValueError, match="cameras: must have at least two independent normals"):
+        Rig(cameras)
 
-    def test_residuals(self):
-        _, rig, tracks, rng = scene(3, n=1000)
-        noisy = [track + 2 * rng.normal(size=track.shape) for track in tracks]
-        noisy[1][:10] = np.nan
-        found = residuals(noisy, rig)
-        assert np.isnan(found[1][:10]).all()
-        assert np.isfinite(found[0]).all()
-        # Three of the six numbers of a frame are free; 6000 of them give the rms to 1 %.
-        rms = np.sqrt(np.nanmean(np.hstack(found) ** 2))
-        assert rms == pytest.approx(2 / np.sqrt(2), rel=0.03)
-        np.testing.assert_allclose(np.hstack(residuals(tracks, rig)), 0, atol=1e-9)
 
-    def test_uncalibrated_rig(self, small):
-        _, rig, tracks, _ = small
-        for use in (reconstruct, residuals):
-            with pytest.raises(
-                ValueError, match=r"rig: .* got cameras\[1\] without scale and angl"
-            ):
-                use(tracks, rig.uncalibrated())
+def test_needs_two_cameras(small):
+    with pytest.raises(ValueError, match="rig: must hold two or more cameras, got 1"):
+        check_learnable(Rig(small[1].cameras[:1]))
+    with pytest.raises(ValueError, match="cameras: must be one or more, got none"):
+        Rig([])
+    for none in (None, small[1].cameras[0], 3):
+        with pytest.raises(ValueError, match="cameras.*: must be"):
+            Rig(none)
+    with pytest.raises(ValueError, match=r"cameras\[0\]: must be of type Camera, got 1"):
+        Rig([1, 2])
+
+
+def test_uncalibrated(small):
+    _, rig, _, _ = small
+    start = rig.uncalibrated(keep=2)
+    assert [camera.is_calibrated for camera in start.cameras] == [False, False, True]
+    assert start.cameras[2] == rig.cameras[2]
+    with pytest.raises(ValueError, match="keep: must be an index of 3 cameras, got 3"):
+        rig.uncalibrated(keep=3)
+    for keep in (1.5, -1, "a"):
+        with pytest.raises(ValueError, match="keep: must be an integer of at least 0, got"):
+            rig.uncalibrated(keep)
+    for name, use in (("rig", Rig.load), ("path", rig.save)):
+        with pytest.raises(ValueError, match=f"{name}: must be the name of a file, got None"):
+            use(None)
+
+
+@given(SEEDS, st.sampled_from([(512, 512), (640, 480), (100, 300)]))
+@settings(max_examples=10)
+def test_around_fills_the_images(seed, image_size):
+    x = trajectory(np.random.default_rng(seed), 200)
+    rig = Rig.around(x, image_size=image_size)
+    half = (np.array(image_size) - 1) / 2
+    for camera in rig.cameras:
+        used = np.abs(camera.project(x) - half) / half
+        assert used.max() == pytest.approx(0.85, abs=1e-6)
+    normals = np.array([camera.normal for camera in rig.cameras])
+    assert np.linalg.svd(normals, compute_uv=False)[-1] > 0.3
+    up = [np.diff(c.project([[0, 0, 0], [0, 0, 1]]), axis=0)[0] for c in rig.cameras]
+    roll = [np.rad2deg(np.arctan2(-right, -down)) for right, down in up]
+    np.testing.assert_allclose(roll, [6, -9, 14], atol=1e-9)
+
+
+def test_around_needs_a_scene():
+    with pytest.raises(ValueError, match="x: must hold at least two different points, got"):
+        Rig.around(np.full((5, 3), np.nan))
+    with pytest.raises(ValueError, match=r"got 1 without NaN in shape \(99, 3\)$"):
+        Rig.around(np.ones((99, 3)))
+    for size in (512, "ab", (1, 512)):
+        with pytest.raises(ValueError, match="image_size: must be two integers of at least 2"):
+            Rig.around(np.eye(3), image_size=size)
+
+
+@pytest.mark.parametrize("learn", [learn_cameras, learn_cameras_eq4])
+@given(SEEDS, st.integers(0, 2))
+@settings(max_examples=8)
+def test_exact_pixels_give_exact_cameras(learn, seed, keep):
+    x, truth, tracks, _ = scene(seed)
+    learned = learn(tracks, truth.uncalibrated(keep))
+    assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
+    np.testing.assert_allclose(reconstruct(tracks, learned), x, atol=1e-9 * np.ptp(x))
+
+
+@given(SEEDS, st.integers(0, 2))
+@settings(max_examples=5)
+def test_integer_pixels_give_a_third_of_a_pixel(seed, keep):
+    x, truth, tracks, _ = scene(seed)
+    tracks = [np.round(track) for track in tracks]
+    learned = learn_cameras(tracks, truth.uncalibrated(keep))
+    assert learned.cameras[keep] == truth.cameras[keep]
+    assert rmse_in_pixels(reconstruct(tracks, learned), x, truth).max() <= 0.35
+
+
+@given(SEEDS, st.integers(2, 6), st.data())
+@settings(max_examples=8)
+def test_any_number_of_cameras_with_missing_views(seed, cameras, data):
+    x, truth, tracks, rng = scene(seed, n=60, cameras=cameras)
+    known = data.draw(st.integers(1, cameras))
+    start = Rig(
+        camera if i < known else replace(camera, scale=None, angle=None)
+        for i, camera in enumerate(truth.cameras)
+    )
+    seen = rng.random((60, cameras)) < 0.8
+    seen[:4] = True
+    for i, track in enumerate(tracks):
+        track[~seen[:, i]] = np.nan
+    learned = learn_cameras(tracks, start)
+    assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
+    found = reconstruct(tracks, learned)
+    enough = seen.sum(axis=1) >= 2
+    np.testing.assert_allclose(found[enough], x[enough], atol=1e-8 * np.ptp(x))
+    assert np.isnan(found[~enough]).all()
+
+
+def test_two_parallel_views_are_not_enough(small):
+    _, rig, _, rng = small
+    twin = replace(rig.cameras[0], normal=-rig.cameras[0].normal)
+    rig = Rig([rig.cameras[0], twin, rig.cameras[1]])
+    tracks = [rng.uniform(0, 511, size=(3, 2)) for _ in range(3)]
+    tracks[2][0] = np.nan
+    assert np.isnan(reconstruct(tracks, rig)).all(axis=1).tolist() == [True, False, False]
+
+
+def test_residuals():
+    _, rig, tracks, rng = scene(3, n=1000)
+    noisy = [track + 2 * rng.normal(size=track.shape) for track in tracks]
+    noisy[1][:10] = np.nan
+    found = residuals(noisy, rig)
+    assert np.isnan(found[1][:10]).all()
+    assert np.isfinite(found[0]).all()
+    # Three of the six numbers of a frame are free; 6000 of them give the rms to 1 %.
+    rms = np.sqrt(np.nanmean(np.hstack(found) ** 2))
+    assert rms == pytest.approx(2 / np.sqrt(2), rel=0.03)
+    np.testing.assert_allclose(np.hstack(residuals(tracks, rig)), 0, atol=1e-9)
+
+
+def test_uncalibrated_rig(small):
+    _, rig, tracks, _ = small
+    for use in (reconstruct, residuals):
+        with pytest.raises(ValueError, match=r"rig: .* got cameras\[1\] without scale and angl"):
+            use(tracks, rig.uncalibrated())
 
 
 def test_calibration_errors(small):
@@ -229,14 +229,13 @@ def test_calibration_errors(small):
         calibration_errors(truth, truth.uncalibrated())
 
 
-class TestOutliers:
-    @pytest.mark.parametrize("learn", [learn_cameras, learn_cameras_eq4])
-    def test_one_outlier_does_not_bend_the_cameras(self, learn):
-        _, truth, tracks, rng = scene(0)
-        turn = rng.uniform(0, 2 * np.pi)
-        tracks[rng.integers(3)][rng.integers(500)] += 200 * np.array([np.cos(turn), np.sin(turn)])
-        learned = learn(tracks, truth.uncalibrated())
-        assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
+@pytest.mark.parametrize("learn", [learn_cameras, learn_cameras_eq4])
+def test_one_outlier_does_not_bend_the_cameras(learn):
+    _, truth, tracks, rng = scene(0)
+    turn = rng.uniform(0, 2 * np.pi)
+    tracks[rng.integers(3)][rng.integers(500)] += 200 * np.array([np.cos(turn), np.sin(turn)])
+    learned = learn(tracks, truth.uncalibrated())
+    assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
 
 
 def test_a_wrong_normal_is_learned_back():
@@ -276,119 +275,115 @@ def aligned(tracks, rig):
     return vl.align(tracks, np.zeros(len(rig.cameras)))
 
 
-class TestBadTracks:
-    def test_masked_rows_are_not_seen(self, small):
-        _, rig, tracks, _ = small
-        wild = tracks[1].copy()
-        wild[3] = 1e6
-        masked = np.ma.masked_array(wild, mask=np.zeros((40, 2), dtype=bool))
-        masked[3, 0] = np.ma.masked
-        assert np.isnan(residuals([tracks[0], masked, tracks[2]], rig)[1][3]).all()
-
-    def test_what_is_no_rig_or_no_tracks(self, small):
-        _, rig, tracks, _ = small
-        for use in (learn_cameras, reconstruct, residuals, vl.learn_lags, aligned):
-            if use is not aligned:
-                with pytest.raises(ValueError, match="rig: must be of type Rig, got 'rig.toml'"):
-                    use(tracks, "rig.toml")
-            for none in (None, "a.mkv", {}, [], np.array(3.0)):
-                with pytest.raises(
-                    ValueError, match=r"tracks: must be a list of arrays \(n, 2\), "
-                ):
-                    use(none, rig)
-            with pytest.raises(ValueError, match=r"tracks\[0\]: must be an array of real numbers"):
-                use(["a.mkv", "b.mkv", "c.mkv"], rig)
-
-    @pytest.mark.parametrize("use", [learn_cameras, reconstruct, residuals])
-    def test_tracks_that_do_not_fit_the_rig(self, small, use):
-        _, rig, tracks, _ = small
-        for bad, message in [
-            (tracks[:2], "tracks: must be one per camera, got 2 for 3 cameras"),
-            ([tracks[0], tracks[1], tracks[2][:-1]], r"same number of frames, got \[40, 40, 39\]"),
-            ([tracks[0], tracks[1], np.nan * tracks[2]], r"tracks\[2\]: must see the target in so"),
-        ]:
-            with pytest.raises(ValueError, match=message):
-                use(bad, rig)
-
-    @pytest.mark.parametrize(
-        ("spoilt", "message"),
-        [
-            (np.zeros(30), r"must have shape \(n, 2\), got \(30,\)"),
-            (np.zeros((30, 3)), r"must have shape \(n, 2\), got \(30, 3\)"),
-            (np.full((30, 2), np.inf), "must be finite or NaN, got 60 infinite values"),
-            (np.full((30, 2), 1e300), r"must be pixels of at most 1e\+100, got 1e\+300"),
-            ("abc", "must be an array of real numbers, got 'abc'"),
-        ],
-    )
-    def test_what_is_no_track(self, small, spoilt, message):
-        _, rig, tracks, _ = small
-        tracks[1] = spoilt
-        for use in (learn_cameras, reconstruct, residuals, vl.learn_lags, aligned):
-            with pytest.raises(ValueError, match=r"tracks\[1\]: " + message):
-                use(tracks, rig)
-
-    def test_too_few_common_frames(self, small):
-        _, rig, tracks, _ = small
-        start = rig.uncalibrated()
-        one = [track[:1] for track in tracks]
-        with pytest.raises(
-            ValueError, match=r"at least 2 equations .* of cameras\[1\] and .* got 1"
-        ):
-            learn_cameras(one, start)
-        tracks[0][20:] = np.nan
-        tracks[1][20:] = np.nan
-        tracks[2][:20] = np.nan
-        with pytest.raises(ValueError, match=r"scale and angle of cameras\[2\], got"):
-            learn_cameras(tracks, start)
-
-    @pytest.mark.parametrize(
-        ("noise", "learn"), [(0, learn_cameras), (3, learn_cameras), (0.3, learn_cameras_eq4)]
-    )
-    def test_static_target(self, small, noise, learn):
-        _, rig, tracks, rng = small
-        still = [track[:1] + noise * rng.normal(size=track.shape) for track in tracks]
-        with pytest.raises(
-            ValueError, match=r"motion must determine .* cameras\[1\] and cameras\[2"
-        ):
-            learn(still, rig.uncalibrated())
+def test_masked_rows_are_not_seen(small):
+    _, rig, tracks, _ = small
+    wild = tracks[1].copy()
+    wild[3] = 1e6
+    masked = np.ma.masked_array(wild, mask=np.zeros((40, 2), dtype=bool))
+    masked[3, 0] = np.ma.masked
+    assert np.isnan(residuals([tracks[0], masked, tracks[2]], rig)[1][3]).all()
 
 
-class TestPosition:
-    """Cameras whose position is not trusted: two more unknowns each."""
+def test_what_is_no_rig_or_no_tracks(small):
+    _, rig, tracks, _ = small
+    for use in (learn_cameras, reconstruct, residuals, vl.learn_lags, aligned):
+        if use is not aligned:
+            with pytest.raises(ValueError, match="rig: must be of type Rig, got 'rig.toml'"):
+                use(tracks, "rig.toml")
+        for none in (None, "a.mkv", {}, [], np.array(3.0)):
+            with pytest.raises(ValueError, match=r"tracks: must be a list of arrays \(n, 2\), "):
+                use(none, rig)
+        with pytest.raises(ValueError, match=r"tracks\[0\]: must be an array of real numbers"):
+            use(["a.mkv", "b.mkv", "c.mkv"], rig)
 
-    @staticmethod
-    def without(rig, *loose):
-        return Rig(
-            replace(camera, position=None) if i in loose else camera
-            for i, camera in enumerate(rig.cameras)
-        )
 
-    @given(SEEDS, st.sampled_from([(0, (2,)), (0, (1,)), (2, (2,)), (1, (0,))]))
-    @settings(max_examples=6)
-    def test_exact_tracks_give_the_exact_path(self, seed, which):
-        keep, loose = which
-        x, rig, tracks, _ = scene(seed, n=100)
-        learned = learn_cameras(tracks, self.without(rig.uncalibrated(keep), *loose))
-        for camera, true in zip(learned.cameras, rig.cameras, strict=True):
-            np.testing.assert_allclose(camera.offset, true.offset, atol=1e-6 * np.abs(x).max())
-        assert np.abs(calibration_errors(learned, rig)).max() < 1e-7
-        assert rmse_in_pixels(reconstruct(tracks, learned), x, rig).max() < 1e-5
-
-    def test_what_cannot_be_learned_is_said(self, small):
-        x, rig, tracks, _ = small
-        with pytest.raises(ValueError, match=r"rig: the positions of two cameras .* got 1"):
-            learn_cameras(tracks, self.without(rig, 1, 2))
-        with pytest.raises(ValueError, match=r"Eq. \(4\) needs all positions, got .* cameras\[2\]"):
-            learn_cameras_eq4(tracks, self.without(rig.uncalibrated(), 2))
-        still = [np.repeat(track[:1], 40, axis=0) for track in tracks]
-        message = r"must determine scale, angle and position of .*cameras\[2\]"
+@pytest.mark.parametrize("use", [learn_cameras, reconstruct, residuals])
+def test_tracks_that_do_not_fit_the_rig(small, use):
+    _, rig, tracks, _ = small
+    for bad, message in [
+        (tracks[:2], "tracks: must be one per camera, got 2 for 3 cameras"),
+        ([tracks[0], tracks[1], tracks[2][:-1]], r"same number of frames, got \[40, 40, 39\]"),
+        ([tracks[0], tracks[1], np.nan * tracks[2]], r"tracks\[2\]: must see the target in so"),
+    ]:
         with pytest.raises(ValueError, match=message):
-            learn_cameras(still, self.without(rig.uncalibrated(), 2))
-        loose = self.without(rig, 1)
-        with pytest.raises(ValueError, match=r"got cameras\[1\] without position; learn_cameras"):
-            reconstruct(tracks, loose)
-        with pytest.raises(ValueError, match="camera: position must be known, got None"):
-            loose.cameras[1].project(x)
+            use(bad, rig)
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "message"),
+    [
+        (np.zeros(30), r"must have shape \(n, 2\), got \(30,\)"),
+        (np.zeros((30, 3)), r"must have shape \(n, 2\), got \(30, 3\)"),
+        (np.full((30, 2), np.inf), "must be finite or NaN, got 60 infinite values"),
+        (np.full((30, 2), 1e300), r"must be pixels of at most 1e\+100, got 1e\+300"),
+        ("abc", "must be an array of real numbers, got 'abc'"),
+    ],
+)
+def test_what_is_no_track(small, spoilt, message):
+    _, rig, tracks, _ = small
+    tracks[1] = spoilt
+    for use in (learn_cameras, reconstruct, residuals, vl.learn_lags, aligned):
+        with pytest.raises(ValueError, match=r"tracks\[1\]: " + message):
+            use(tracks, rig)
+
+
+def test_too_few_common_frames(small):
+    _, rig, tracks, _ = small
+    start = rig.uncalibrated()
+    one = [track[:1] for track in tracks]
+    with pytest.raises(ValueError, match=r"at least 2 equations .* of cameras\[1\] and .* got 1"):
+        learn_cameras(one, start)
+    tracks[0][20:] = np.nan
+    tracks[1][20:] = np.nan
+    tracks[2][:20] = np.nan
+    with pytest.raises(ValueError, match=r"scale and angle of cameras\[2\], got"):
+        learn_cameras(tracks, start)
+
+
+@pytest.mark.parametrize(
+    ("noise", "learn"), [(0, learn_cameras), (3, learn_cameras), (0.3, learn_cameras_eq4)]
+)
+def test_static_target(small, noise, learn):
+    _, rig, tracks, rng = small
+    still = [track[:1] + noise * rng.normal(size=track.shape) for track in tracks]
+    with pytest.raises(ValueError, match=r"motion must determine .* cameras\[1\] and cameras\[2"):
+        learn(still, rig.uncalibrated())
+
+
+def without(rig, *loose):
+    return Rig(
+        replace(camera, position=None) if i in loose else camera
+        for i, camera in enumerate(rig.cameras)
+    )
+
+
+@given(SEEDS, st.sampled_from([(0, (2,)), (0, (1,)), (2, (2,)), (1, (0,))]))
+@settings(max_examples=6)
+def test_exact_tracks_give_the_exact_path(seed, which):
+    keep, loose = which
+    x, rig, tracks, _ = scene(seed, n=100)
+    learned = learn_cameras(tracks, without(rig.uncalibrated(keep), *loose))
+    for camera, true in zip(learned.cameras, rig.cameras, strict=True):
+        np.testing.assert_allclose(camera.offset, true.offset, atol=1e-6 * np.abs(x).max())
+    assert np.abs(calibration_errors(learned, rig)).max() < 1e-7
+    assert rmse_in_pixels(reconstruct(tracks, learned), x, rig).max() < 1e-5
+
+
+def test_what_cannot_be_learned_is_said(small):
+    x, rig, tracks, _ = small
+    with pytest.raises(ValueError, match=r"rig: the positions of two cameras .* got 1"):
+        learn_cameras(tracks, without(rig, 1, 2))
+    with pytest.raises(ValueError, match=r"Eq. \(4\) needs all positions, got .* cameras\[2\]"):
+        learn_cameras_eq4(tracks, without(rig.uncalibrated(), 2))
+    still = [np.repeat(track[:1], 40, axis=0) for track in tracks]
+    message = r"must determine scale, angle and position of .*cameras\[2\]"
+    with pytest.raises(ValueError, match=message):
+        learn_cameras(still, without(rig.uncalibrated(), 2))
+    loose = without(rig, 1)
+    with pytest.raises(ValueError, match=r"got cameras\[1\] without position; learn_cameras"):
+        reconstruct(tracks, loose)
+    with pytest.raises(ValueError, match="camera: position must be known, got None"):
+        loose.cameras[1].project(x)
 
 
 NOISE = 0.3  # pixels
