@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from helpers import aligned_error, by_hand, room, walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,7 +10,6 @@ from hypothesis import strategies as st
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import Lags, learn_cameras, systematic_errors
 from vidsindy_lite.cameras.adjust import (
-    SIZE,
     adjust,
     fitted_factor,
     known_to,
@@ -137,16 +135,6 @@ def test_a_measurement_that_is_far_off_is_told():
     (warning,) = learn_cameras(tracks, vl.Rig([wrong, *others])).warnings
     assert "of cameras[0] is" in warning
     assert "times its error from what was measured" in warning
-
-
-@pytest.mark.parametrize("views", [2, 4])
-def test_the_noise_is_that_of_the_tracks_however_many_views_there_are(views):
-    told = []
-    for rng in np.random.default_rng(6).spawn(4):
-        rig = room(rng, views)
-        _, tracks = film(rng, rig, noise=0.4, n=1000)
-        told += [adjust(Footage.of(tracks), rig.cameras, np.zeros((views, SIZE)), most=0).noise]
-    assert np.mean(told) == pytest.approx(0.4, rel=0.04)
 
 
 def test_how_well_a_camera_is_known():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.cameras import Clock
-from vidsindy_lite.cameras.clocks import Curve, Footage, Lags, check_clocks, check_lags, check_rates
+from vidsindy_lite.cameras.clocks import Lags, check_clocks, check_lags, check_rates
 
 
 def test_the_times_of_each_track_are_checked():
@@ -96,26 +96,3 @@ def test_a_frame_is_that_of_the_instant():
     assert [dropped.frame_at(1, instant) for instant in (1, 4, 8)] == [0, 2, 5]
     faster = Lags(np.array([0, 1.0]), np.array([1, 2.0]), np.zeros(2), 0.0, clocks=ticks)
     assert [faster.frame_at(1, instant) for instant in (1, 3, 5)] == [0, 3, 6]
-
-
-@pytest.mark.parametrize("rate", [1.0, 2.0])
-def test_slopes_in_lag_and_drift_are_those_of_the_track(rate):
-    """Of a straight motion, exactly what `later` makes of a small step."""
-    t = 20 + np.arange(41.0)
-    straight = np.column_stack([5 + 2 * np.arange(81), 7 - np.arange(81)])
-    curves = tuple(Curve(straight, np.arange(81.0)) for _ in range(2))
-    footage = Footage(curves, t, np.array([0, 1.5]), np.array([1.0, rate / 2]))
-    lag, drift = footage.slopes(1)
-    step, still = np.array([0, 1e-6]), np.zeros(2)
-    for slope, changed in ((lag, footage.later(step, still)), (drift, footage.later(still, step))):
-        numeric = (changed.aligned[1] - footage.aligned[1]) / 1e-6
-        np.testing.assert_allclose(numeric, slope, atol=1e-6)
-
-
-def test_a_later_video_is_later_in_the_middle():
-    """Wherever the instants begin: the drift is none in their middle, half of it at either end."""
-    curves = tuple(Curve(np.zeros((100, 2)), np.arange(100.0)) for _ in range(2))
-    footage = Footage(curves, np.array([20.0, 30, 40]), np.array([0, 3.0]), np.array([1, 2.0]))
-    changed = footage.later(np.array([0, 0.5]), np.array([0, 4.0]))
-    by = (changed.frames(1) - footage.frames(1)) / footage.rates[1]
-    np.testing.assert_allclose(by, [-0.5 + 2, -0.5, -0.5 - 2])

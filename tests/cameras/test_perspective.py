@@ -104,14 +104,6 @@ def test_bad_radius():
             camera.ball_image([[0, 0, 0]], radius)
 
 
-def test_parallel_views_from_two_places_are_a_rig():
-    place = {"normal": (0, 0, 1), "scale": 1e-3, "angle": 0}
-    rig = Rig(PerspectiveCamera(position=(b, 0, 10), **place) for b in (0, 1))
-    x = np.random.default_rng(0).normal(size=(20, 3))
-    tracks = [camera.project(x) for camera in rig.cameras]
-    np.testing.assert_allclose(reconstruct(tracks, rig), x, atol=1e-10)
-
-
 @given(SEEDS, st.integers(3, 6), st.data())
 @settings(max_examples=10)
 def test_exact_pixels_give_exact_cameras(seed, cameras, data):

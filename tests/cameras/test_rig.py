@@ -19,17 +19,6 @@ def test_a_template_is_a_rig_with_one_calibrated_camera(tmp_path, cameras, model
     assert {camera.image_size for camera in rig.cameras} == {(640, 480)}
 
 
-@pytest.mark.parametrize("model", ["orthographic", "perspective"])
-def test_its_origin_is_in_the_middle_and_z_is_up(tmp_path, model):
-    path = tmp_path / "rig.toml"
-    path.write_text(rig_template(model=model), encoding="utf-8")
-    camera = vl.Rig.load(path).cameras[0]
-    origin, above = camera.project([[0, 0, 0], [0, 0, 0.5]])
-    np.testing.assert_allclose(origin, (959.5, 539.5), atol=2)  # its numbers are rounded
-    assert abs(above[0] - origin[0]) < 1
-    assert above[1] < origin[1] - 10
-
-
 def test_what_a_hand_measures(tmp_path):
     """A field of view of 90 degrees shows at one metre two metres; a roll turns the z axis left."""
     path = tmp_path / "rig.toml"

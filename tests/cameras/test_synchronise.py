@@ -67,14 +67,6 @@ def test_cubic_motions_are_interpolated_exactly(lag, rate):
     assert shown[covered].all()
 
 
-def test_nothing_is_made_up_in_gaps(motion):
-    tracks = filmed(motion, (50, 50, 50), (0, 0, 0))
-    tracks[1][20:25] = np.nan
-    _, second, _ = align(tracks, (0, 0.5, 0))
-    hidden = np.isnan(second).any(axis=1)
-    assert np.flatnonzero(hidden).tolist() == [0, *range(20, 26)]
-
-
 def test_fractional_lags_and_different_lengths(motion):
     lags = (0, 7.4, -12.7)
     tracks = filmed(motion, (250, 230, 240), lags)

@@ -60,17 +60,6 @@ def test_orthographic_views_whose_cameras_are_not_learned_yet(seed, count):
         assert_told_apart(told.tracks, views)
 
 
-def test_perspective_views_with_noise():
-    seed = 1
-    rng = np.random.default_rng(seed)
-    rig = room(rng)
-    paths = [walk(np.arange(FRAMES)), walk(np.arange(FRAMES) + 700 + 90 * seed)]
-    tracks, views = filmed(rig, paths, rng, noise=0.5)
-    told = identify(tracks, rig)
-    assert not told.doubts
-    assert_told_apart(told.tracks, views, tolerance=5.0)
-
-
 def test_a_meeting_that_one_view_alone_does_not_see_costs_its_frames_only():
     rig, truth, views = two_walks(3)
     views = [view.reshape(FRAMES, -1) for view in views]

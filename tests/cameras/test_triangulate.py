@@ -128,14 +128,3 @@ def test_epipolar_lines_as_opencv(kinds):
         design, target = epipolar_rows(ours, other, moved)
         missed = np.abs(design @ unit - target) / other.scale
         np.testing.assert_allclose(missed, distance, atol=1e-4)
-
-
-@pytest.mark.parametrize(("apart", "told"), [(1.3e-6, False), (2e-6, True)])
-def test_cameras_that_hardly_stand_apart_cannot_disagree(apart, told):
-    # The line of sight, at 45 degrees, comes closest to the origin .71 deep and .71 aside. What the
-    # cameras are apart shows as .71 of that, and counts from 1e-6 (.71 + .71 * .71) on.
-    half = np.sqrt(0.5)
-    place = {"normal": (0, 0, 1), "scale": 1.0, "angle": 0.0, "image_size": (1, 1)}
-    known = PerspectiveCamera(position=(-half, 0, half), **place)
-    other = PerspectiveCamera(position=(-half, apart, half), **place)
-    assert np.isfinite(epipolar_lines(known, np.array([[1.0, 0.0]]), other)[1]).all() == told

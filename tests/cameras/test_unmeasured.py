@@ -34,18 +34,6 @@ def filmed(rng, rig, late=(0.0,) * 5, noise=0.5):
     return [track + noise * rng.normal(size=track.shape) for track in tracks]
 
 
-@pytest.mark.parametrize(("seed", "cameras"), [(1, 4)])
-def test_the_path_is_found_but_for_a_similarity(seed, cameras):
-    rng = np.random.default_rng([seed, cameras])
-    rig = room(rng, cameras)
-    x, tracks = walk(np.arange(FRAMES)), filmed(rng, rig)
-    learned = vl.learn_cameras(tracks, lenses(rng, rig))
-    assert learned.warnings == ()
-    size = np.ptp(x, axis=0).max()
-    # No mirror image: `aligned_error` allows for none.
-    assert aligned_error(vl.reconstruct(tracks, learned), x) < 0.005 * size
-
-
 def test_the_frame_is_that_of_the_first_camera_and_is_told():
     rng = np.random.default_rng(1)
     rig = room(rng)

@@ -9,14 +9,11 @@ from vidsindy_lite.vision.background import (
     Blob,
     _unrest,
     displacement,
-    median_image,
-    sample_frames,
     track_blobs,
     view_distances,
     whole_views,
 )
 from vidsindy_lite.vision.rendering import Scene, render
-from vidsindy_lite.vision.video import Reel, write_video
 
 SIZE = (128, 96)
 
@@ -26,13 +23,6 @@ def texture():
     """A smooth random image, coarse pixels."""
     rng = np.random.default_rng(0)
     return cv2.GaussianBlur(rng.uniform(0, 255, (60, 80, 3)).astype(np.float32), (0, 0), 3) * 4
-
-
-def test_the_median_of_images():
-    images = np.random.default_rng(0).integers(0, 256, (21, 10, 12, 3), np.uint8)
-    before = images.copy()
-    np.testing.assert_array_equal(median_image(images), np.median(images, axis=0))
-    np.testing.assert_array_equal(images, before)
 
 
 def test_one_push_or_one_change_of_light_is_unrest(texture):
@@ -156,14 +146,6 @@ def test_a_square_that_stays_in_most_samples_is_no_background(left, top):
     model = learned(np.array(stays + leaves))
     np.testing.assert_array_equal(model.background, squares())
     assert model.area == 16**2
-
-
-def test_samples_are_spread_from_the_first_frame_to_the_last(tmp_path):
-    for n in (50, 21, 3):
-        frames = [np.full((64, 64, 3), 4 * i, np.uint8) for i in range(n)]
-        samples = sample_frames(Reel(write_video(tmp_path / "clip.mov", frames)))
-        numbers = samples[:, 0, 0, 0] // 4
-        np.testing.assert_array_equal(numbers, np.unique(np.linspace(0, n - 1, 21).round()))
 
 
 @pytest.mark.parametrize(("reach", "shows"), [(3, True), (7, True), (30, False)])

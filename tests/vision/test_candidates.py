@@ -15,26 +15,8 @@ from vidsindy_lite.vision.candidates import (
     components,
     followed,
     plainest_paths,
-    uncommon,
 )
 from vidsindy_lite.vision.video import Reel
-
-
-def test_of_a_crowd_of_like_things_none_is_worth_much():
-    n = 11
-    centre = np.column_stack([20.0 * np.arange(n), np.zeros(n)])
-    colour = np.array([(50 + k, 70, 60) for k in range(8)] + [(30, 30, 210), (35, 30, 210),
-                                                            (50, 70, 60)], float)  # fmt: skip
-    area = np.array([50.0] * 10 + [500.0])
-    found = Candidates(np.zeros(n, int), centre, centre, np.zeros((n, 4)), area, colour,
-                       np.zeros((n, 3)), np.full(n, 0.8))  # fmt: skip
-    assert uncommon(found, 1).quality == pytest.approx([0.8 * 2 / 8] * 8 + [0.8] * 3)
-    leaves = found.only(np.arange(8))
-    assert uncommon(leaves, 7).quality == pytest.approx([0.8] * 8)
-    # The same thing at several levels is no crowd.
-    alone = leaves._replace(centre=np.zeros((8, 2)))
-    assert uncommon(alone, 1).quality == pytest.approx([0.8] * 8)
-    assert len(uncommon(found.only(np.arange(0)), 1).quality) == 0
 
 
 def found_in(*parts, colour=(20, 40, 220), behind=(90, 100, 110), level=1.0):

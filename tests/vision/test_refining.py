@@ -48,15 +48,6 @@ def test_the_centroid_and_area_of_a_disc_are_those_of_its_parts_of_pixels(radius
     assert look(ground, box, colour, centre, ground) is None
 
 
-@pytest.mark.parametrize(("shade", "faint"), [(90, False), (176, False), (192, True)])
-def test_a_view_before_ground_of_about_its_own_colour_is_faint(shade, faint):
-    ground = np.full((60, 80, 3), 90, np.uint8)
-    ground[:, 10:70] = shade
-    share = disc((40.0, 30.0), 8)
-    frame = np.rint((1 - share) * ground + share * 200).astype(np.uint8)
-    assert look(frame, (32, 22, 16, 16), [200] * 3, (40, 30), ground).faint == faint
-
-
 @pytest.mark.parametrize("colour", [(75, 130, 110), (70, 98, 122)])
 def test_a_shadow_that_touches_the_target_is_no_part_of_it_unless_they_look_alike(colour):
     ground = np.full((60, 80, 3), (100, 140, 175), np.uint8)

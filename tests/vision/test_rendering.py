@@ -259,24 +259,6 @@ def test_outlines_have_the_area_of_their_disc_and_their_centroid_at_zero(shape, 
     np.testing.assert_allclose(centroid, 0, atol=1e-9 * size)
 
 
-def test_outlines_are_of_their_kind():
-    disc = Scene(size=20).outline()
-    assert disc.shape == (128, 2)
-    np.testing.assert_allclose(np.hypot(*disc.T), 10, rtol=1e-3)
-    counts, spreads = set(), []
-    for seed in range(30):
-        corners = Scene(shape="polygon", size=20, shape_seed=seed).outline()
-        counts.add(len(corners))
-        turns = np.diff(np.unwrap(np.arctan2(*corners.T[::-1]), period=2 * np.pi))
-        # Corners are as far apart as those of a regular one, but for .4 of that.
-        spreads.append(np.abs(turns * len(corners) / (2 * np.pi) - 1).max())
-        blob = Scene(shape="irregular", size=20, shape_seed=seed).outline()
-        assert len(blob) == 128
-        assert 1.1 < np.hypot(*blob.T).max() / np.hypot(*blob.T).min() < 4
-    assert counts == {3, 4, 5, 6}
-    assert 0.2 < max(spreads) < 0.8
-
-
 def test_random_scenes_are_drawn_from_their_ranges():
     scenes = [Scene.random(seed) for seed in range(200)]
     assert {s.background for s in scenes} == set(BACKGROUNDS)

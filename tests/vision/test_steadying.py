@@ -170,21 +170,6 @@ def test_a_camera_held_before_a_plain_wall_is_doubted(tmp_path):
     assert any("too plain to tell whether the camera moves" in doubt for doubt in found.warnings)
 
 
-@pytest.mark.parametrize(("gone", "found"), [(0.55, True), (0.8, False)])
-@pytest.mark.parametrize("across", [True, False])
-def test_two_views_must_share_three_tenths_of_what_they_show(across, gone, found):
-    rng = np.random.default_rng(0)
-    cloud = cv2.GaussianBlur(rng.normal(size=(560, 640)).astype(np.float32), (0, 0), 6)
-    scene = (100 + 20 * cloud / cloud.std()).astype(np.float32)
-    u, v = (round(gone * 160), 0) if across else (0, round(gone * 120))
-    before, after = scene[200:320, 200:360], scene[200 + v : 320 + v, 200 + u : 360 + u]
-    guess = similar(-2.0 * u, -2.0 * v)
-    told = align_on(grounds([before]), [after], guess)
-    assert (told is not None) == found
-    if told:
-        np.testing.assert_allclose(told.map, guess, atol=0.05)
-
-
 def test_the_error_of_a_map_is_about_that_by_which_it_misses():
     errors, misses = [], []
     for seed in range(6):

@@ -48,16 +48,6 @@ def test_clean_textured_video(tmp_path, background):
     assert np.sqrt(np.mean(error**2)) < 0.02
 
 
-def test_image_noise(tmp_path):
-    truth = winding_path(100)
-    scene = Scene.random(0, size=18, noise_variance=0.01, size_variation=0.2, image_size=SIZE)
-    path = render_video(tmp_path / "clip.mov", truth, scene)
-    difference = track(path).pixels - truth
-    assert np.isfinite(difference[:, 0]).mean() >= 0.97
-    assert np.sqrt(np.nanmean(difference**2)) < 0.15
-    assert np.abs(np.nanmean(difference, axis=0)).max() < 0.04
-
-
 @pytest.mark.parametrize(
     ("post", "variance"), [((100, 20, 44, 172), 0), ((120, 20, 12, 172), 0.005)]
 )

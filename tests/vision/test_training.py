@@ -34,14 +34,6 @@ def test_a_training_again_gives_the_same_weights_and_log(small, tmp_path, capsys
     assert sorted(p.suffix for p in tmp_path.iterdir()) == [".json"] * 3 + [".pt"] * 3
 
 
-def test_the_log_of_a_training_tells_the_loss_of_block_after_block():
-    log = training._training_log(3, [float(step) for step in range(251)], 7)
-    assert (log["seed"], log["steps"], log["parameters"]) == (3, 251, 7)
-    assert log["frames"] == 251 * training.BATCH
-    assert log["steps_per_loss"] == 2
-    assert log["loss"] == [*np.arange(0.5, 250, 2), 250]  # the last one stands alone
-
-
 def test_the_loss_of_perfect_predictions_is_least():
     centre, size = torch.tensor([[30.2, 41.7]]), torch.tensor([[20.0, 24.0]])
     place = anchors(16, 16)
