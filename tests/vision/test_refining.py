@@ -103,6 +103,15 @@ def test_what_is_far_off_the_line_from_ground_to_target_has_another_colour(contr
     assert area > 0.9 * 26**2 if same else area < 0.7 * 26**2
 
 
+def test_what_differs_from_the_ground_the_other_way_round_is_another_colour():
+    ground, box = GROUND[0, 0].astype(int), (30, 20, 20, 15)
+    for width, both in ((10, 300), (18, 270)):  # a tenth of another colour is no part of it
+        rest = ((30 + width, 20, 20 - width, 15), ground // 10)
+        view = look(painted(((30, 20, width, 15), 2 * ground), rest), box, 2 * ground)
+        assert view.area == pytest.approx(15 * width, rel=0.1)
+        assert view.whole.area == pytest.approx(both, rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("corner", "inside"),
     [((3, 3), True), ((0, 20), False), ((30, 0), False),
