@@ -44,6 +44,14 @@ def test_phone_footage(tmp_path, phone):
     assert np.nanpercentile(error, 95) < 1.5
 
 
+def test_a_large_target_is_plainer_than_leaves_that_sway(tmp_path):
+    phone = Phone("sea", 58, colour=(200, 30, 185), noise=3, leaves=True, **SMALL)
+    truth, _ = write_phone(tmp_path / "clip.mp4", phone, 1)
+    found, error = errors(tmp_path / "clip.mp4", truth)
+    assert np.nanpercentile(error, 95) < 1.5
+    assert not found.warnings
+
+
 def test_where_two_things_move_alike_it_says_so_and_a_hint_decides(tmp_path):
     n = 60
     t = np.arange(n)
