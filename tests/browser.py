@@ -92,10 +92,6 @@ class Browser:
         )
         return answer["result"]["value"] | {"errors": self._errors(), "requests": self._requests()}
 
-    def screenshot(self) -> str:
-        """The open page as far as its end, a PNG in base64."""
-        return self.command("Page.captureScreenshot", captureBeyondViewport=True)["data"]
-
     def _receive(self) -> dict:
         message = json.loads(self.socket.recv())
         if "method" in message:

@@ -1,7 +1,7 @@
 """Films as phones write them, with the exact track of the target: for the tests of the tracker.
 
 A ball moves through a room (perspective, so that its size changes), blurred by its own motion and
-that of the camera, before light that flickers, beside its shadow, a person, leaves or an occluder,
+that of the camera, before light that flickers, beside its shadow, a person or leaves,
 with sensor noise, and is written by H.264 at a low bit rate.
 """
 
@@ -12,9 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vidsindy_lite.vision.rendering import BACKGROUNDS, bark, coverage, leaves
-
-BACKDROPS = ("plain", "sky", "hills", "sea", "wood", "bricks")
+from vidsindy_lite.vision.rendering import BACKGROUNDS, coverage, leaves
 
 
 @dataclass(frozen=True)
@@ -35,35 +33,10 @@ class Phone:
     shadow: bool = False
     person: bool = False
     leaves: bool = False
-    occluder: bool = False
     camera: str = "fixed"
     bitrate: int = 4_000_000
     image_size: tuple[int, int] = (640, 480)
     frames: int = 120
-
-    @classmethod
-    def random(cls, rng: np.random.Generator, **fixed) -> "Phone":
-        """One of the films that people make."""
-        width, height = fixed.get("image_size", (640, 480))
-        size = float(np.exp(rng.uniform(np.log(6), np.log(90))))
-        vivid = [(215, 30, 35), (200, 30, 185), (250, 225, 15), (250, 115, 5), (20, 18, 22),
-                 (240, 240, 235), (40, 150, 60)]  # fmt: skip
-        drawn = {
-            "background": str(rng.choice(BACKDROPS)),
-            "size": size,
-            "nearness": float(rng.uniform(1, 1.4)),
-            "colour": vivid[rng.integers(len(vivid))],
-            "exposure": float(rng.uniform(0.1, 1.0)),
-            "flicker": float(rng.choice([0, 0.03, 0.1])),
-            "noise": float(rng.uniform(1, 5)),
-            "shadow": bool(rng.random() < 0.4),
-            "person": bool(rng.random() < 0.35),
-            "leaves": bool(rng.random() < 0.35),
-            "occluder": bool(rng.random() < 0.25),
-            "camera": str(rng.choice(["fixed", "fixed", "trembling", "held"])),
-            "bitrate": int(np.exp(rng.uniform(np.log(1e6), np.log(8e6)))),
-        }
-        return cls(**(drawn | fixed))
 
 
 def path_of(phone: Phone, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -144,11 +117,6 @@ def render_phone(phone: Phone, seed: int = 0):
     places, scale = path_of(phone, rng)
     maps = camera_maps(phone, rng)
     phase = rng.uniform(0, 6)
-    post = None
-    if phone.occluder:
-        left = int(rng.uniform(0.35, 0.6) * width)
-        post = np.s_[margin : margin + height, margin + left : margin + left + 36]
-        texture = bark(rng, (36, height)).astype(np.float32)
     twigs = []
     for _ in range(25 * phone.leaves):
         place = rng.uniform(0, 1, 2) * [width, 0.3 * height] + margin
@@ -182,8 +150,6 @@ def render_phone(phone: Phone, seed: int = 0):
             _paint(image, _disc(centre, size), phone.colour)
             total += image / steps
         window[:] = total
-        if post is not None:
-            base[post] = texture
         middle = maps[8 * i + 4]
         base = cv2.warpPerspective(base, middle @ shift, (width, height))
         there = (middle @ [*here, 1])[:2]

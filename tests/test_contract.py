@@ -39,10 +39,7 @@ def test_the_contract_is_kept():
 @pytest.mark.parametrize(
     ("module", "line"),
     [
-        ("dynamics/solver.py", "from ..cameras import Rig"),
-        ("cameras/models.py", "def late():\n    from ..study import SYSTEMS"),
-        ("vision/video.py", "import vidsindy_lite.pipeline"),
-        ("study/paper.py", "from ..companion import artifacts"),
+        ("dynamics/solver.py", "def late():\n    from ..cameras import Rig"),
         ("checks.py", "from .repository import PACKAGE"),
     ],
 )
@@ -74,7 +71,6 @@ def test_rooms_are_entered_by_their_front_door(room):
 @pytest.mark.parametrize(
     ("line", "door"),
     [
-        ("from ..dynamics.solver import discover", "dynamics.solver"),
         ("from vidsindy_lite.cameras.rig import Rig", "cameras.rig"),
         ("def late():\n    from ..cameras.rig import Rig", "cameras.rig"),
     ],

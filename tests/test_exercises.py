@@ -44,9 +44,6 @@ def run_cells(notebook, seed):
             exec(compile(source, f"cell {index}", "exec"), space)
 
 
-# ------------------------------------------------------------------------------- our exercises pass
-
-
 def test_every_notebook_has_exercises():
     assert [path.stem for path in SOLUTIONS] == [path.stem for path in SOURCES]
     made = {path.stem for path in (NOTEBOOKS / "exercises").glob("*.ipynb")}
@@ -84,8 +81,6 @@ def test_a_wrong_letter_is_not_right(path):
                 exec(f"from zlib import crc32\nanswer = 'wrong'\n{check}", {})
 
 
-# ------------------------------------------------------------------------------ each gate can fail
-
 CELLS = """\
 # %% [markdown]
 # **1.** (Prove.) One and one?
@@ -108,7 +103,6 @@ print("right")
         ("answer = 2", "answer = 3", None),
         ("assert answer == 2", "assert 1 + 1 == 2", "sees nothing"),
         ('print("right")', 'print("done")', "sees nothing"),
-        ('assert answer == 2\nprint("right")', "", "sees nothing"),
         ('# %% tags=["solution"]', "# %%", "no check"),
         ("answer = 2", "answer = 2\n" * 16, "more than 15 lines"),
     ],

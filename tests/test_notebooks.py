@@ -54,9 +54,6 @@ LENGTH = lambda path: -path.stat().st_size  # noqa: E731
 VOLATILE = re.compile(r"0x[0-9a-f]{6,}|/(tmp|home|root|Users)/|\\Users\\")
 
 
-# ------------------------------------------------------------------------ gates: a list of problems
-
-
 def executed_half(path):
     """The .ipynb beside a .py; no cells if there is none, which `pair_problems` reports."""
     executed = path.with_suffix(".ipynb")
@@ -223,13 +220,6 @@ def orphan_problems(notebooks):
     return [path.name for path in sorted(notebooks.glob("*.ipynb")) if path.stem not in sources]
 
 
-# ------------------------------------------------------------------------------ our notebooks pass
-
-
-def test_there_are_notebooks():
-    assert NOTEBOOKS
-
-
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 @pytest.mark.parametrize(
     "gate",
@@ -245,10 +235,6 @@ def test_there_are_notebooks():
 )
 def test_notebook(path, gate):
     assert gate(path) == []
-
-
-def test_every_executed_half_has_its_source():
-    assert orphan_problems(ROOT / "notebooks") == []
 
 
 KEYS = {"id", "kind", "notebook", "caption", "tolerance", "rows", "numbers", "words"}
@@ -277,6 +263,7 @@ def test_records_are_of_our_notebooks_and_hold_no_hash(folder):
     assert {record["notebook"] for record in records} <= {path.stem for path in NOTEBOOKS}
     assert {key for record in records for key in record} <= KEYS
     assert folder == REFERENCES or folder_problems(folder) == []
+    assert orphan_problems(ROOT / "notebooks") == []
 
 
 def run_problems(path, folder, cache, references=REFERENCES, seed=None):
@@ -303,9 +290,6 @@ def test_quick_run(path, seed, tmp_path, shared_cache):
     problems = run_problems(path, tmp_path, shared_cache, seed=seed)
     copy = f"if that is meant, copy the tables from build/quick/figures to {REFERENCES}"
     assert not problems, "\n".join([*problems, copy])
-
-
-# ------------------------------------------------------------------------------ each gate can fail
 
 
 def test_a_figure_that_cannot_be_drawn_is_seen_without_paper():
@@ -361,7 +345,6 @@ def test_a_good_pair_passes(pair, old, new):
     ("gate", "half", "old", "new", "problem"),
     [
         (pair_problems, ".py", "x = 1", "x = 2", "cell 2"),
-        (pair_problems, ".py", "A tiny notebook", "A small notebook", "cell 0"),
         (pair_problems, ".py", '# %% tags=["parameters"]', "# %%", "cell 1"),
         (pair_problems, ".py", "# %%\nx = 1", "# %% [markdown]\n# x = 1", "cell 2"),
         (pair_problems, ".py", "# %%\nx = 1\n", "", "3 cells beside 4"),
@@ -370,7 +353,6 @@ def test_a_good_pair_passes(pair, old, new):
          "cell 2 was not executed"),
         (hash_problems, ".ipynb", '"jupytext": {', '"stamp": "1",\n  "jupytext": {', "stamp"),
         (import_problems, ".py", "x = 1", "from vidsindy_lite.cameras import Rig", "cameras"),
-        (import_problems, ".py", "x = 1", "import vidsindy_lite.repository", "repository"),
         (import_problems, ".py", "x = 1",
          "def late():\n    from vidsindy_lite.study.metrics import score", "study.metrics"),
         (output_problems, ".ipynb", '"x + 1"', "\"save_figure('waves', figure)\"",
@@ -386,7 +368,6 @@ def test_a_good_pair_passes(pair, old, new):
                 ("profile: str", "size: str", "no parameters cell"),
                 ("  # full or quick", "", "parameters: not"),
                 ("x = 1", "import numpy as np\nnp.random.seed(0)", "state: np.random.seed"),
-                ("x = 1", "x = numpy.random.normal()", "random state: numpy.random.normal"),
                 ("x = 1", "import random", "random state: import random"),
                 ("x = 1", "torch.manual_seed(0)", "random state: torch.manual_seed"),
                 ("x = 1", "x = 1\n" * 16, "has 16 lines"),
@@ -453,10 +434,7 @@ print(versions())
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        ("**Afterwards you can**", ""),
         ("**Covers**", ""),
-        ("## What we learned", ""),
-        ("**What the paper says and what we found.**", ""),
         ("exercises/story.ipynb", "exercises/tale.ipynb"),
         (", [solutions](solutions/story.ipynb)", ""),
         ("assert True", "True"),
@@ -494,12 +472,6 @@ def named(tables):
     return number_problems(tables / "01_first.py", tables / "quick", tables / "committed")
 
 
-def test_numbers_of_the_same_quick_run_agree(tables):
-    edit(tables / "quick" / "found.json", "0.5", "0.51")
-    edit(tables / "quick" / "found.json", "3.0", "9.0")
-    assert named(tables) == []
-
-
 @pytest.mark.parametrize(
     ("folder", "old", "new", "place"),
     [
@@ -509,30 +481,26 @@ def test_numbers_of_the_same_quick_run_agree(tables):
     ],
 )
 def test_numbers_of_another_quick_run_are_named(tables, folder, old, new, place):
+    edit(tables / "quick" / "found.json", "3.0", "9.0")  # seconds
+    assert named(tables) == []
     edit(tables / folder / "found.json", old, new)
     (problem,) = named(tables)
     assert problem.startswith(f"found: {place}")
-
-
-@pytest.mark.parametrize("folder", ["committed", "quick"])
-def test_a_table_on_one_side_only_is_named(tables, folder):
-    (tables / folder / "found.json").unlink()
+    (tables / folder / "found.json").unlink()  # on one side only
     assert [problem.partition(":")[0] for problem in named(tables)] == ["found"]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("claim", "names"), [("value == 1", 2), ("value == 1.01", 1)])
-def test_a_quick_run_fails_by_its_claim_and_by_its_table(tiny, tmp_path, claim, names):
+def test_a_quick_run_fails_by_its_claim_and_by_its_table(tiny, tmp_path):
     save = """\
 from vidsindy_lite.companion import artifacts
 value = 1.01
 artifacts.save_table("found", [{"system": "Lorenz", "value": value}], caption="A.")"""
-    path = tiny.write("01_first", save, f"assert {claim}")
+    path = tiny.write("01_first", save, "assert value == 1")
     (tmp_path / "references").mkdir()
     write_table(tmp_path / "references", "found", "01_first", {"system": "Lorenz", "value": 1.0})
     problems = run_problems(path, tmp_path / "run", tmp_path, tmp_path / "references")
-    assert len(problems) == names
     assert problems[0].startswith("found: row 0 (Lorenz), column value: 1.0 committed, 1.01")
+    assert "AssertionError" in problems[1]
 
 
 @pytest.fixture
@@ -548,7 +516,7 @@ def complete(tmp_path, monkeypatch):
     return tmp_path / "figures"
 
 
-@pytest.mark.parametrize("content", [None, "", "{", "[1]", '{"id": 3}'])
+@pytest.mark.parametrize("content", [None, "{", '{"id": 3}'])
 def test_folder_gate_names_what_is_missing_and_what_is_stray(complete, content):
     assert folder_problems(complete) == []
     (complete / "fig_2.png").unlink()

@@ -35,9 +35,8 @@ def in_own_time(found, motion):
     return study.score(law, truth)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_tracks_by_their_own_clocks_give_the_path(motion, seed):
-    rng = np.random.default_rng(seed)
+def test_tracks_by_their_own_clocks_give_the_path(motion):
+    rng = np.random.default_rng(0)
     clocks = [waver(rng, 300) for _ in range(3)]
     seen = vl.observe_tracks(filmed(motion, clocks), motion[2].uncalibrated(0), clocks)
     step = np.median(np.diff(clocks[0]))
@@ -50,15 +49,9 @@ def test_tracks_by_their_own_clocks_give_the_path(motion, seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("dropped", [False, True])
-def test_the_law_of_a_phones_films_is_exact(motion, tmp_path, dropped):
+def test_the_law_of_a_phones_films_is_exact(motion, tmp_path):
     rng = np.random.default_rng(5)
-    clocks = [
-        np.delete(np.arange(400), rng.permutation(np.arange(1, 399))[:20]) / RATE
-        if dropped
-        else waver(rng, 350)
-        for _ in range(3)
-    ]
+    clocks = [waver(rng, 350) for _ in range(3)]
     scene, paths = vl.Scene("sea", size=16), []
     for i, track in enumerate(filmed(motion, clocks)):
         frames = render(track, scene, seed=i)

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from helpers import aligned_error, by_hand, room, walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,10 +10,7 @@ from hypothesis import strategies as st
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import Lags, learn_cameras, systematic_errors
 from vidsindy_lite.cameras.adjust import (
-    PARTS,
-    SIZE,
     adjust,
-    changed,
     fitted_factor,
     known_to,
     long_run_covariance,
@@ -37,7 +33,7 @@ def film(rng, rig, noise=0.5, n=400):
 
 
 @given(SEEDS, st.integers(3, 5))
-@settings(max_examples=8)
+@settings(max_examples=4)
 def test_a_rig_measured_by_hand_becomes_as_good_as_the_true_one(seed, cameras):
     rng = np.random.default_rng(seed)
     rig = room(rng, cameras)
@@ -48,17 +44,6 @@ def test_a_rig_measured_by_hand_becomes_as_good_as_the_true_one(seed, cameras):
     best = aligned_error(vl.reconstruct(tracks, rig), x)
     assert aligned_error(vl.reconstruct(tracks, learned), x) < 1.1 * best + 1e-4
     assert aligned_error(vl.reconstruct(tracks, given_rig), x) > 2 * best
-
-
-def test_cameras_stay_as_close_to_the_measurements_as_these_are_good():
-    rng = np.random.default_rng(5)
-    rig = room(rng, 4)
-    _, tracks = film(rng, rig)
-    learned = learn_cameras(tracks, by_hand(rng, rig))
-    for found, true in zip(learned.cameras, rig.cameras, strict=True):
-        assert np.linalg.norm(found.position - true.position) < 0.15
-        assert np.arccos(found.normal @ true.normal) < np.deg2rad(4)
-        assert abs(np.log(found.scale / true.scale)) < 0.1
 
 
 def test_exact_measurements_are_not_touched():
@@ -72,12 +57,11 @@ def test_exact_measurements_are_not_touched():
         np.testing.assert_array_equal(found.normal, true.normal)
 
 
-@pytest.mark.parametrize("measured", [False, True])
-def test_outliers_do_no_harm(measured):
+def test_outliers_do_no_harm():
     rng = np.random.default_rng(2)
     rig = room(rng)
     x, tracks = film(rng, rig)
-    start = by_hand(rng, rig) if measured else rig.uncalibrated()
+    start = by_hand(rng, rig)
     wild = [track.copy() for track in tracks]
     far = rng.uniform(size=(len(wild), len(x))) < 0.05
     for track, frames in zip(wild, far, strict=True):
@@ -109,51 +93,10 @@ def test_a_rolling_shutter_is_learned():
     assert aligned_error(vl.reconstruct(tracks, learned), x) < 1.1 * best
 
 
-@pytest.mark.parametrize("readout", [0.3, -0.8])
-def test_a_known_readout_is_undone(readout):
-    rng = np.random.default_rng(6)
-    rig = room(rng, 3, readout=readout)
-    x, tracks = film(rng, rig, noise=0)
-    # Inside, where the spline has neighbours on both sides.
-    np.testing.assert_allclose(vl.reconstruct(tracks, rig)[5:-5], x[5:-5], atol=1e-5)
-    still = vl.Rig(replace(c, readout=0.0) for c in rig.cameras)
-    assert np.abs(vl.reconstruct(tracks, still) - x).max() > 1e-3
-
-
-@given(SEEDS)
-@settings(max_examples=20)
-def test_a_change_and_back(seed):
-    rng = np.random.default_rng(seed)
-    camera = room(rng).cameras[0]
-    change = 0.01 * rng.normal(size=SIZE)
-    change[PARTS["normal"]] = 0.0  # a tilt turns the axes of the next one
-    moved = changed(camera, change)
-    back = changed(moved, -change)
-    x = walk(np.arange(20))
-    np.testing.assert_allclose(back.project(x), camera.project(x), atol=1e-9)
-    assert changed(camera, np.zeros(SIZE)) is camera
-
-
-def test_orthographic_normals_measured_by_hand():
-    x = 10 * walk(np.arange(400))
-    rng = np.random.default_rng(8)
-    rig = vl.Rig.around(x)
-    tracks = [c.project(x) + 0.5 * rng.normal(size=(400, 2)) for c in rig.cameras]
-    tilted = vl.Rig(
-        replace(c, normal=c.normal + 0.03 * rng.normal(size=2) @ c.rows, normal_error=2.0)
-        for c in rig.cameras
-    ).uncalibrated()
-    learned = learn_cameras(tracks, tilted)
-    best = aligned_error(vl.reconstruct(tracks, rig), x)
-    assert aligned_error(vl.reconstruct(tracks, learned), x) < 2 * best
-    blind = vl.Rig(replace(c, normal_error=0.0) for c in tilted.cameras)
-    assert aligned_error(vl.reconstruct(tracks, learn_cameras(tracks, blind)), x) > 4 * best
-
-
 def test_what_remains_uncertain_is_as_large_as_the_error():
     """Over many rigs the error of the path lies in the modes, and is as large as they say."""
     size = []
-    for seed in range(12):
+    for seed in range(6):
         rng = np.random.default_rng(seed)
         rig = room(rng, 4)
         x, tracks = film(rng, rig, n=200)
@@ -168,14 +111,6 @@ def test_what_remains_uncertain_is_as_large_as_the_error():
         assert np.sum((off.ravel() - told @ ways) ** 2) < 0.05 * np.sum(off**2) + 1e-8
         size.append((told / sizes)[:7] ** 2)
     assert 0.3 < np.mean(size) < 3
-
-
-def test_a_still_target_tells_nothing():
-    rng = np.random.default_rng(9)
-    rig = room(rng)
-    spot = [np.tile(c.project(np.zeros((1, 3))), (50, 1)) for c in rig.cameras]
-    with pytest.raises(ValueError, match="the target's motion must determine scale and angle"):
-        learn_cameras(spot, by_hand(rng, rig).uncalibrated())
 
 
 def test_noise_and_outliers_are_told_apart():
@@ -200,37 +135,6 @@ def test_a_measurement_that_is_far_off_is_told():
     (warning,) = learn_cameras(tracks, vl.Rig([wrong, *others])).warnings
     assert "of cameras[0] is" in warning
     assert "times its error from what was measured" in warning
-
-
-@pytest.mark.parametrize("views", [2, 3, 4])
-def test_the_noise_is_that_of_the_tracks_however_many_views_there_are(views):
-    told = []
-    for rng in np.random.default_rng(6).spawn(8):
-        rig = room(rng, views)
-        _, tracks = film(rng, rig, noise=0.4, n=1500)
-        told += [adjust(Footage.of(tracks), rig.cameras, np.zeros((views, SIZE)), most=0).noise]
-    assert np.mean(told) == pytest.approx(0.4, rel=0.04)
-
-
-def test_the_unit_of_length_does_not_matter():
-    rng = np.random.default_rng(13)
-    rig = room(rng)
-    _, tracks = film(rng, rig, n=100)
-    changes = []
-    for unit in (1.0, 1e9):
-        cameras = [
-            replace(c, position=unit * c.position, position_error=unit * c.position_error)
-            for c in by_hand(np.random.default_rng(1), rig).cameras
-        ]
-        errors = np.array([known_to(camera) for camera in cameras])
-        change = adjust(Footage.of(tracks), cameras, errors).change
-        change[:, PARTS["position"]] /= unit
-        changes.append(change)
-    assert np.abs(changes[0]).max() > 0.01
-    np.testing.assert_allclose(changes[1], changes[0], rtol=0, atol=1e-5)
-
-
-CAMERA = room(np.random.default_rng(3), principal_point=(630.0, 350.0), readout=0.3).cameras[0]
 
 
 def test_how_well_a_camera_is_known():

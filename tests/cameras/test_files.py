@@ -1,7 +1,6 @@
 """Calibrations of other tools: their projections to a billionth of a pixel, there and back."""
 
 import json
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -64,17 +63,16 @@ def toml(parts, head="cam_{}", matrix=False):
     return text + "[metadata]\nadjusted = false\nerror = 0.5\n"
 
 
-@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(
     ("head", "matrix"), [("cam_{}", False), ("cam_0{}", True), ("cameras.{}", False)]
 )
-def test_anipose_pose2sim_and_caliscope(tmp_path, seed, head, matrix):
-    parts = rooms(seed)
+def test_anipose_pose2sim_and_caliscope(tmp_path, head, matrix):
+    parts = rooms(0)
     (tmp_path / "a.toml").write_text(toml(parts, head, matrix), encoding="utf-8")
     assert_same(read_calibration([tmp_path / "a.toml"]), parts)
 
 
-@pytest.mark.parametrize("suffix", [".yml", ".yaml", ".json", ".xml"])
+@pytest.mark.parametrize("suffix", [".yaml", ".json", ".xml"])
 def test_opencv_storage_one_file_a_camera(tmp_path, suffix):
     parts, paths = rooms(4), []
     for i, part in enumerate(parts):
@@ -156,50 +154,24 @@ def test_the_command_line(tmp_path, capsys):
     assert_same(vl.Rig.load(tmp_path / "again.toml"), parts)
     assert main(["rig-template", "--output", str(tmp_path / "t.toml")]) == 0
     assert len(vl.Rig.load(tmp_path / "t.toml").cameras) == 3
-
-
-@pytest.mark.parametrize("name", ["rig-template", "rig-import"])
-def test_the_command_line_names_what_cannot_be_written(tmp_path, capsys, name):
-    calibration, there = tmp_path / "a.toml", str(tmp_path / "none" / "b.toml")
-    calibration.write_text(toml(rooms(10)), encoding="utf-8")
-    rig = tmp_path / "rig.toml"
-    assert main(["rig-import", str(calibration), "--output", str(rig)]) == 0
-    given = {
-        "rig-template": ["--output", there],
-        "rig-import": [str(calibration), "--output", there],
-    }
-    assert main([name, *given[name]]) == 2
+    there = str(tmp_path / "none" / "b.toml")
     told = f"error: output: must be a file in a folder that exists, got '{there}'"
-    assert capsys.readouterr().err.splitlines() == [told]
-
-
-# ---------------------------------------------------------------------------------------- bad input
+    for command in (["rig-template"], ["rig-import", str(tmp_path / "a.toml")]):
+        assert main([*command, "--output", there]) == 2
+        assert capsys.readouterr().err.splitlines() == [told]
 
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (
-            "rotation = ",
-            "rotated = ",
-            r"^paths: camera cam_0: R: must be given \(r, rotation",
-        ),
+        ("rotation = ", "rotated = ", r"^paths: camera cam_0: R: must be given \(r, rotation"),
         ("translation = [", "translation = [1.0, ", "t: must be finite and of shape"),
         ("[metadata]", "[", r"paths: must be a TOML file, got '.*a\.toml': "),
         ("matrix = ", "matrices = ", "must hold a camera matrix"),
         ("matrix = [[", "matrix = [[-", "K: must be"),
-        (
-            'name = "1"',
-            "fisheye = true",
-            "camera cam_1: fisheye: must be none but of a lens .*, got True",
-        ),
         ('name = "1"', "rotation_count = 1", "camera cam_1: rotation_count: must be 0, got 1"),
         ("distortions = [", "distortions = [1, 1, 1, 1, ", "dist: must be k1, k2, p1, p2, k3"),
-        (
-            "size = [ 1280, 720,]",
-            "size = [ 1280 ]",
-            r"size: must be .* of shape \(2,\), got \[1280\]",
-        ),
+        ("size = [ 1280, 720,]", "size = [ 1280 ]", r"size: must be .* of shape \(2,\), got"),
         ("rotation = [", "rotation = ['a', ", "R: must be an array of real numbers, got"),
     ],
 )
@@ -221,9 +193,7 @@ def test_malformed_tables_are_refused_by_name(tmp_path, old, new, message):
         ("a.csv", "nan,2\n" * 11, "must hold finite numbers"),
         ("a.csv", "0,0\n" * 11, "must be of a camera at a finite place"),
         ("a.json", "{", "must be a JSON file"),
-        ("a.json", "[1, 2]", "must hold a camera matrix"),
         ("a.yml", "no yaml: [", "a.yml"),
-        ("a.npz", "no archive", "must be a .npz file of numbers"),
         ("a.npz", "PK\x03\x04 no archive", "must be a .npz file of numbers"),
         ("a.mat", "x", "must end in .toml, .* or .txt, got '.*a.mat'"),
     ],
@@ -236,29 +206,20 @@ def test_files_that_are_no_calibration(tmp_path, name, content, message):
     assert "\n" not in str(caught.value)
 
 
-def test_no_such_file(tmp_path):
+def test_one_name_is_no_list_of_files():
+    for paths in ("a.toml", 3):
+        with pytest.raises(ValueError, match="paths: must be a list of files, got"):
+            read_calibration(paths)
     with pytest.raises(FileNotFoundError, match="paths: no such calibration file, got '"):
-        read_calibration([tmp_path / "none.toml"])
-
-
-@pytest.mark.parametrize("paths", ["a.toml", 3, Path("a.toml")])
-def test_one_name_is_no_list_of_files(paths):
-    with pytest.raises(ValueError, match="paths: must be a list of files, got"):
-        read_calibration(paths)
-
-
-# -------------------------------------------------------------------------- what is told or refused
+        read_calibration(["none.toml"])
 
 
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        ("model", "fisheye"), ("camera_model", "FISHEYE"), ("distortion_model", "equidistant"),
-        ("distortion_model", "kannala_brandt"), ("fisheye_model", 1), ("fisheye", True),
-        ("lens_model", "LENSMODEL_OPENCV_FISHEYE"), ("camera_model", "omni"),
-        ("is_fisheye", "yes"),
-        ("model", "OPENCV_FISHEYE"), ("projection_type", "stereographic"),
-        ("camera_type", "fisheye"),
+        ("camera_model", "FISHEYE"), ("distortion_model", "kannala_brandt"), ("fisheye_model", 1),
+        ("fisheye", True), ("is_fisheye", "yes"), ("lens_model", "LENSMODEL_OPENCV_FISHEYE"),
+        ("projection_type", "stereographic"), ("camera_type", "omni"),
     ],
 )  # fmt: skip
 def test_other_lenses_are_refused_by_name(tmp_path, key, value):
@@ -274,7 +235,7 @@ def test_other_lenses_are_refused_by_name(tmp_path, key, value):
     ("key", "value"),
     [
         ("model", "pinhole"), ("camera_model", "OPENCV"), ("distortion_model", "plumb_bob"),
-        ("fisheye_model", 0), ("fisheye", "false"), ("lens_model", "rational_polynomial"),
+        ("fisheye_model", 0), ("fisheye", "false"),
     ],
 )  # fmt: skip
 def test_our_lens_under_its_names(tmp_path, key, value):

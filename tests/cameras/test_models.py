@@ -1,21 +1,17 @@
 """Models of cameras: planes, the convention, lenses, shutters, and what bad input is told."""
 
-import cProfile
 import pickle
-import pstats
 import warnings
 from dataclasses import FrozenInstanceError, replace
 
 import cv2
 import numpy as np
 import pytest
-from helpers import scene, trajectory
+from helpers import scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-import vidsindy_lite as vl
-from vidsindy_lite import cameras
 from vidsindy_lite.cameras import OrthographicCamera, PerspectiveCamera, Rig
 from vidsindy_lite.cameras.models import (
     distorted,
@@ -26,70 +22,6 @@ from vidsindy_lite.cameras.models import (
     signed_distance,
     undistorted,
 )
-
-
-@pytest.fixture
-def camera():
-    return vl.PerspectiveCamera(
-        position=(1, 2, 9), normal=(0.1, 0.2, 1), scale=0.01, angle=0.4, image_size=(64, 48)
-    )
-
-
-def test_matrices_are_computed_once_and_read_only(camera):
-    for name in ("rows", "offset", "matrix"):
-        assert getattr(camera, name) is getattr(camera, name)
-        with pytest.raises(ValueError, match="read-only"):
-            getattr(camera, name)[0] = 1
-
-
-def test_a_changed_camera_has_matrices_of_its_own(camera):
-    before = camera.matrix
-    moved = replace(camera, position=(0, 0, 5))
-    assert not np.array_equal(moved.matrix, before)
-    np.testing.assert_array_equal(
-        camera.calibrated(0.02 * np.exp(0.3j)).matrix, before
-    )  # position and normal alone
-    flat = vl.OrthographicCamera(normal=(0.1, 0.2, 1), scale=0.01, angle=0.4)
-    first, second = flat.placed(np.array([1.0, 2.0])), flat.placed(np.array([3.0, 4.0]))
-    np.testing.assert_allclose(first.matrix[:2, 3], [-1, -2])
-    np.testing.assert_allclose(second.matrix[:2, 3], [-3, -4])
-    again = first.placed(np.array([5.0, 6.0]))
-    np.testing.assert_allclose(again.offset, [5, 6])
-    np.testing.assert_allclose(again.position @ again.normal, 0, atol=1e-12)
-
-
-def test_a_used_camera_can_be_pickled(camera):
-    _ = camera.matrix
-    assert pickle.loads(pickle.dumps(camera)) == camera
-
-
-def test_the_base_is_no_camera():
-    with pytest.raises(TypeError, match="abstract"):
-        vl.Camera(normal=(0, 0, 1))
-
-
-def test_arguments_are_checked_once():
-    """Learning, lags and errors of 300 frames once made 46,609 checks of arrays."""
-    x = trajectory(np.random.default_rng(4), 300)
-    rig = vl.Rig.around(x)
-    rng = np.random.default_rng(0)
-    tracks = [c.project(x) + 0.05 * rng.normal(size=(300, 2)) for c in rig.cameras]
-    start = rig.uncalibrated()
-
-    def run():
-        lags = vl.learn_lags(tracks, start)
-        aligned = vl.align(tracks, lags.frames)
-        learned = vl.learn_cameras(aligned, start)
-        vl.reconstruct(aligned, learned)
-        cameras.systematic_errors(tracks, start, learned, lags)
-        cameras.tracking_errors(aligned, learned)
-
-    profile = cProfile.Profile()
-    profile.runcall(run)
-    stats = pstats.Stats(profile).stats
-    checks = sum(v[0] for (_, _, name), v in stats.items() if name == "check_array")
-    assert 0 < checks < 200
-
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -105,6 +37,7 @@ def test_convention_by_hand():
     np.testing.assert_allclose(camera.project([[1, 2, -9]]), [[255.5, 255.5]])
     np.testing.assert_allclose(camera.project([[2, 2, 0]]), [[257.5, 255.5]])
     np.testing.assert_allclose(camera.project([[1, 3, 0]]), [[255.5, 253.5]])
+    assert np.isnan(camera.project([[np.nan, 0, 0]])).all()
 
 
 @given(SEEDS)
@@ -120,33 +53,23 @@ def test_project_satisfies_the_camera_equation(seed):
         np.testing.assert_allclose(left, right, atol=1e-10 * np.abs(x).max())
 
 
-def test_plane_coordinates_undo_project(small):
+def test_depth_is_not_seen(small):
     x, rig, tracks, _ = small
     for camera, track in zip(rig.cameras, tracks, strict=True):
         seen = camera.plane_coordinates(track)
         np.testing.assert_allclose(seen, x @ camera.rows.T, atol=1e-10 * np.abs(x).max())
-
-
-def test_depth_is_not_seen(small):
-    x, rig, tracks, _ = small
-    for camera, track in zip(rig.cameras, tracks, strict=True):
         on_plane = plane_projection(x, camera.normal, -camera.normal @ camera.position)
         np.testing.assert_allclose(camera.project(on_plane), track, atol=1e-9)
         nearer = replace(camera, position=camera.position + 3 * camera.normal)
         np.testing.assert_allclose(nearer.project(x), track, atol=1e-9)
 
 
-def test_nan_rows_pass_through():
-    camera = OrthographicCamera(position=(0, 0, 0), normal=(1, 1, 1), scale=1, angle=0)
-    pixels = camera.project([[np.nan, 0, 0], [0, 0, 0]])
-    assert np.isnan(pixels[0]).all()
-    np.testing.assert_allclose(pixels[1], 255.5)
-
-
 def test_is_frozen_and_normalises():
     camera = OrthographicCamera(position=[1, 2, 3], normal=[0, 3, 4])
     np.testing.assert_allclose(camera.normal, [0, 0.6, 0.8], rtol=1e-15)
     assert not camera.is_calibrated
+    for length in (1e-200, 1e200, 5e-324):
+        assert replace(camera, normal=[0, 0, length]).normal.tolist() == [0, 0, 1]
     with pytest.raises(FrozenInstanceError):
         camera.scale = 1.0
     with pytest.raises(ValueError, match="read-only"):
@@ -166,16 +89,9 @@ def test_hash_agrees_with_equality():
     assert len({rig, Rig(rig.cameras), rig.uncalibrated()}) == 2
 
 
-@pytest.mark.parametrize("length", [1e-200, 1e200, 5e-324])
-def test_normals_of_any_length(length):
-    camera = OrthographicCamera(position=[0, 0, 0], normal=[0, 0, length])
-    assert camera.normal.tolist() == [0, 0, 1]
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"position": (1, 2)}, "position: must be 3 finite numbers, got"),
         ({"position": (1, 2, np.inf)}, "position: must be 3 finite numbers, got"),
         ({"normal": (0, 0, 0)}, "normal: must not be the zero vector, got"),
         ({"normal": "up"}, "normal: must be an array of real numbers, got 'up'"),
@@ -183,16 +99,15 @@ def test_normals_of_any_length(length):
         ({"scale": 0}, "scale: must be positive, got 0"),
         ({"scale": -1}, "scale: must be positive, got -1"),
         ({"scale": True}, "scale: must be a finite number, got True"),
-        ({"scale": np.nan}, "scale: must be a finite number, got nan"),
         ({"angle": "left"}, "angle: must be a finite number, got 'left'"),
         ({"image_size": (512, 0)}, r"image_size: must be two integers .*, got \(512, 0\)"),
-        ({"image_size": (512.5, 512)}, "image_size: must be two integers of at least 1, got"),
-        ({"image_size": 512}, "image_size: must be two integers of at least 1, got 512"),
         ({"principal_point": (1, 2, 3)}, "principal_point: must be 2 finite numbers, got"),
         ({"aspect": 0}, "aspect: must be positive, got 0"),
         ({"position_error": "far"}, "position_error: must be a finite number, got 'far'"),
+        ({"normal_error": -0.5}, "normal_error: must be zero or positive, got -0.5"),
+        ({"readout": -1.01}, "readout: must be between -1 and 1 frames, got"),
+        ({"readout": 1.01}, "readout: must be between -1 and 1 frames, got"),
         ({"distortion": range(9)}, "distortion: must be at most 8 finite numbers, k1"),
-        ({"distortion": (np.nan,)}, "distortion: must be at most 8 finite numbers"),
         ({"distortion": 0.1}, "distortion: must be at most 8 finite numbers"),
     ],
 )
@@ -200,6 +115,8 @@ def test_bad_camera(change, message):
     good = {"position": (0, 0, 0), "normal": (0, 0, 1), "scale": 1.0, "angle": 0.0}
     with pytest.raises(ValueError, match=message):
         PerspectiveCamera(**good | change)
+    short = PerspectiveCamera(**good, distortion=(-0.1, 0.02))
+    assert short.distortion.tolist() == [-0.1, 0.02, 0, 0, 0]
 
 
 def test_bad_points(small):
@@ -221,22 +138,6 @@ def test_pixels_of_an_oblong_image_and_back():
     np.testing.assert_allclose(camera.project([[2, 3, 0]]), [[12, 17.5]])
     np.testing.assert_allclose(camera.centred(np.array([[12, 17.5]])), [[2, 2]])
     np.testing.assert_allclose(camera.plane_coordinates([[12, 17.5]]), [[2, 3]])
-
-
-@pytest.mark.parametrize("readout", [-1, 1])
-def test_readouts_are_a_frame_at_most(readout):
-    assert OrthographicCamera(normal=(0, 0, 1), readout=readout).readout == readout
-    with pytest.raises(ValueError, match="readout: must be between -1 and 1 frames, got"):
-        OrthographicCamera(normal=(0, 0, 1), readout=1.01 * readout)
-
-
-@pytest.mark.parametrize("name", ["position_error", "normal_error", "readout_error"])
-def test_errors_of_measurements_are_not_negative(name):
-    camera = OrthographicCamera(normal=(0, 0, 1), **{name: 0.5})
-    assert camera.errors[name] == 0.5
-    assert sum(camera.errors.values()) == 0.5
-    with pytest.raises(ValueError, match=f"{name}: must be zero or positive, got -0.5"):
-        OrthographicCamera(normal=(0, 0, 1), **{name: -0.5})
 
 
 E_Z = np.array([0.0, 0.0, 1.0])
@@ -266,15 +167,6 @@ def test_rotation_to_z_is_a_rotation_of_the_normal_to_z(normal):
     np.testing.assert_allclose(rotation[2], unit, atol=1e-14)
 
 
-@given(directions())
-def test_rotation_to_z_is_the_shortest(normal):
-    # No rotation that takes n to e_z turns by less than the angle between them.
-    unit = normal / np.linalg.norm(normal)
-    angle = np.arctan2(np.hypot(unit[0], unit[1]), unit[2])
-    turned = Rotation.from_matrix(rotation_to_z(normal)).magnitude()
-    assert turned == pytest.approx(angle, abs=1e-7)
-
-
 def test_rotation_to_z_by_hand():
     np.testing.assert_allclose(
         rotation_to_z([1, 0, 0]), [[0, 0, -1], [0, 1, 0], [1, 0, 0]], atol=1e-15
@@ -282,27 +174,20 @@ def test_rotation_to_z_by_hand():
     np.testing.assert_allclose(
         rotation_to_z([0, 1, 0]), [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-15
     )
-
-
-def test_normals_along_z():
     np.testing.assert_array_equal(rotation_to_z([0, 0, 2]), np.eye(3))
     np.testing.assert_allclose(rotation_to_z([0, 0, -2]), np.diag([1, -1, -1]), atol=1e-15)
 
 
-@pytest.mark.parametrize("tilt", 10.0 ** np.arange(-300, 0, 23))
-def test_continuous_near_parallel(tilt):
-    rotation = rotation_to_z([tilt, -2 * tilt, 1])
-    np.testing.assert_allclose(rotation, np.eye(3), atol=2.5 * tilt)
-    # The tilt itself is not rounded away.
-    np.testing.assert_allclose(rotation[:2, 2], [-tilt, 2 * tilt], rtol=3 * tilt + 1e-14)
-
-
-@pytest.mark.parametrize("tilt", 10.0 ** np.arange(-300, 0, 23))
-def test_accurate_near_antiparallel(tilt):
-    normal = np.array([tilt, tilt, -1])
-    rotation = rotation_to_z(normal)
-    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-14)
-    np.testing.assert_allclose(rotation @ (normal / np.linalg.norm(normal)), E_Z, atol=1e-14)
+def test_accurate_near_the_z_axis():
+    for tilt in 10.0 ** np.arange(-300, 0, 23):
+        rotation = rotation_to_z([tilt, -2 * tilt, 1])
+        np.testing.assert_allclose(rotation, np.eye(3), atol=2.5 * tilt)
+        # The tilt itself is not rounded away.
+        np.testing.assert_allclose(rotation[:2, 2], [-tilt, 2 * tilt], rtol=3 * tilt + 1e-14)
+        normal = np.array([tilt, tilt, -1])
+        rotation = rotation_to_z(normal)
+        np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-14)
+        np.testing.assert_allclose(rotation @ (normal / np.linalg.norm(normal)), E_Z, atol=1e-14)
 
 
 @given(vectors(100.0), directions(), st.floats(-100, 100))
@@ -314,46 +199,16 @@ def test_projection_is_the_nearest_point_of_the_plane(x, normal, d):
     np.testing.assert_allclose(plane_projection(foot, normal, d), foot, atol=1e-10 / length)
 
 
-def test_projection_is_equation_s3():
-    x, y, z = point = np.array([1.0, -2.0, 3.0])
-    a, b, c, d = 0.5, 2.0, -1.0, 4.0
-    expected = np.array(
-        [
-            x * (b**2 + c**2) - a * (b * y + c * z + d),
-            y * (a**2 + c**2) - b * (a * x + c * z + d),
-            z * (a**2 + b**2) - c * (a * x + b * y + d),
-        ]
-    ) / (a**2 + b**2 + c**2)
-    np.testing.assert_allclose(plane_projection(point, (a, b, c), d), expected, rtol=1e-14)
-
-
-@given(vectors(100.0), directions(), st.floats(-100, 100), st.floats(-100, 100))
-def test_in_plane_coordinates_do_not_depend_on_d(x, normal, d1, d2):
-    unit = normal / np.linalg.norm(normal)
-    rotation = rotation_to_z(unit)
-    first = rotation @ plane_projection(x, unit, d1)
-    second = rotation @ plane_projection(x, unit, d2)
-    np.testing.assert_allclose(first[:2], second[:2], atol=1e-11)
-    np.testing.assert_allclose(first[:2], rotation[:2] @ x, atol=1e-11)
-    assert first[2] - second[2] == pytest.approx(d2 - d1, abs=1e-11)
-
-
-@given(vectors(100.0), directions())
-def test_offset_is_the_signed_distance_to_the_turned_coordinate_planes(position, normal):
-    x_axis, y_axis, z_axis = rotation_to_z(normal)
-    to_yz = signed_distance(position, *plane_through((0, 0, 0), y_axis, z_axis))
-    to_xz = signed_distance(position, *plane_through((0, 0, 0), z_axis, x_axis))
-    offset = OrthographicCamera(position=position, normal=normal).offset
-    np.testing.assert_allclose(offset, [to_yz, to_xz], atol=1e-11)
-
-
-def test_plane_through_by_hand():
+def test_planes_and_distances_by_hand():
     normal, d = plane_through((1, 0, 2), (0, 1, 2), (-1, -1, 2))
     np.testing.assert_allclose(normal, E_Z, atol=1e-15)
     assert d == pytest.approx(-2)
-
-
-def test_a_small_triangle_far_away_is_a_plane():
+    projected = plane_projection([[np.nan] * 3, [1.0, 2.0, 3.0]], (0, 0, 1), 0)
+    np.testing.assert_array_equal(projected, [[np.nan] * 3, [1, 2, 0]])
+    # A distance does not depend on the length of the equation; a small triangle is a plane.
+    x = np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]])
+    np.testing.assert_allclose(signed_distance(x, (0, 0, 2), -4), [1, -2])
+    np.testing.assert_allclose(signed_distance(x, (0, 0, -2), 4), [-1, 2])
     normal, d = plane_through((1e6, 0, 0), (1e6, 1e-6, 0), (1e6, 0, 1e-6))
     np.testing.assert_allclose(normal, [1, 0, 0], atol=1e-15)
     assert d == pytest.approx(-1e6)
@@ -362,24 +217,11 @@ def test_a_small_triangle_far_away_is_a_plane():
             plane_through((0, 0, 0), (size, size, 0), (3 * size, 3 * size, 1e-13 * size))
 
 
-def test_distance_does_not_depend_on_the_length_of_the_equation():
-    x = np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]])
-    np.testing.assert_allclose(signed_distance(x, (0, 0, 2), -4), [1, -2])
-    np.testing.assert_allclose(signed_distance(x, (0, 0, -2), 4), [-1, 2])
-
-
-def test_planes_pass_nan_rows_through():
-    projected = plane_projection([[np.nan] * 3, [1.0, 2.0, 3.0]], (0, 0, 1), 0)
-    assert np.isnan(projected[0]).all()
-    np.testing.assert_array_equal(projected[1], [1, 2, 0])
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [
         (lambda: rotation_to_z([0, 0, 0]), "normal: must not be the zero vector, got"),
         (lambda: rotation_to_z([1, 2]), "normal: must be 3 finite numbers, got"),
-        (lambda: rotation_to_z([1, np.nan, 0]), "normal: must be 3 finite numbers, got"),
         (lambda: rodrigues([0, 0, 0], 1.0), "axis: must not be the zero vector, got"),
         (lambda: rodrigues([0, 0, 1], np.inf), "angle: must be a finite number, got inf"),
         (lambda: plane_projection([1, 2], [0, 0, 1], 0), r"x: must have shape \(\.\.\., 3\), got"),
@@ -390,9 +232,6 @@ def test_planes_pass_nan_rows_through():
 def test_bad_input(call, message):
     with pytest.raises(ValueError, match=message):
         call()
-
-
-SEEDS = st.integers(0, 2**32 - 1)
 
 
 def any_camera(rng, **more):
@@ -419,7 +258,7 @@ def in_view(rng, camera, n=50):
 
 
 @given(SEEDS)
-@settings(max_examples=40)
+@settings(max_examples=20)
 def test_agrees_with_opencv(seed):
     rng = np.random.default_rng(seed)
     camera = any_camera(rng)
@@ -435,17 +274,11 @@ def test_agrees_with_opencv(seed):
     shift = -rotation @ camera.position
     expected, _ = cv2.projectPoints(x, cv2.Rodrigues(rotation)[0], shift, inner, camera.distortion)
     np.testing.assert_allclose(camera.project(x), expected[:, 0], atol=1e-9, rtol=0)
-
-
-@given(SEEDS)
-@settings(max_examples=40)
-def test_the_ideal_image_is_found_again(seed):
-    rng = np.random.default_rng(seed)
-    camera = any_camera(rng)
-    x = in_view(rng, camera)
+    # And the ideal image is found again.
     pinhole = replace(camera, distortion=None, principal_point=None, aspect=1.0)
     ideal = pinhole.centred(pinhole.project(x))
     np.testing.assert_allclose(camera.centred(camera.project(x)), ideal, atol=1e-9, rtol=0)
+    assert pickle.loads(pickle.dumps(camera)) == camera  # though it is used
 
 
 def test_where_the_model_folds_there_is_no_ideal_image():
@@ -485,19 +318,6 @@ def test_a_file_keeps_every_digit(tmp_path_factory, seed):
     rig.save(path)
     assert Rig.load(path) == rig
     assert len({rig, Rig.load(path), Rig((rig.cameras[0], any_camera(rng)))}) == 2
-
-
-def test_an_orthographic_camera_has_no_distortion(tmp_path):
-    path = tmp_path / "rig.toml"
-    path.write_text("[[camera]]\nnormal = [0, 0, 1]\ndistortion = [0.1]\n", encoding="utf-8")
-    message = "camera 0: distortion: must be one of model, target, position"
-    with pytest.raises(ValueError, match=message):
-        Rig.load(path)
-
-
-def test_short_distortion_is_filled_with_zeros():
-    camera = PerspectiveCamera(position=(0, 0, 0), normal=(0, 0, 1), distortion=(-0.1, 0.02))
-    assert camera.distortion.tolist() == [-0.1, 0.02, 0, 0, 0]
 
 
 def test_a_ball_through_a_lens():
@@ -548,17 +368,3 @@ def test_a_steady_motion_is_put_back_in_time(readout, height):
     np.testing.assert_allclose(seen[:, 1], a + b * (k + late), atol=1e-9 * height)
     expected = np.column_stack((5 - 2 * k, a + b * k))
     np.testing.assert_allclose(steadied(seen, readout, height), expected, atol=1e-8 * height)
-
-
-def test_the_middle_row_is_on_time():
-    track = np.column_stack((np.arange(9.0) ** 2, np.full(9, 49.5)))
-    np.testing.assert_allclose(steadied(track, 0.8, 100), track, atol=1e-12)
-
-
-@pytest.mark.parametrize("readout", [0.8, -0.8])
-def test_an_outlier_does_not_overtake_its_neighbours(readout):
-    track = np.column_stack((np.arange(20.0), np.full(20, 99.0)))
-    track[9, 1] = 5000.0
-    found = steadied(track, readout, 100)
-    assert np.isfinite(found).all()
-    np.testing.assert_allclose(found[0:4, 0], np.arange(4) - readout * 49.5 / 100, atol=0.05)

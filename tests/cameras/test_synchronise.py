@@ -13,15 +13,11 @@ from scipy.interpolate import CubicSpline
 
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import align, disagreement, learn_lags, list_lags
-from vidsindy_lite.cameras import synchronise as synchrony
 from vidsindy_lite.cameras.adjust import PARTS, SIZE, adjust
 from vidsindy_lite.cameras.clocks import Footage
 from vidsindy_lite.cameras.synchronise import Timing
 
 NOISE = 0.05  # pixels
-
-
-# ---------------------------------------------------------------------------------------- the clock
 
 
 def test_whole_lags_move_tracks_as_they_are(motion):
@@ -34,12 +30,7 @@ def test_whole_lags_move_tracks_as_they_are(motion):
     np.testing.assert_array_equal(third, tracks[2][12:112])
 
 
-def test_only_differences_of_lags_count(motion):
-    tracks = filmed(motion, (40, 40, 40), (0, 0, 0))
-    for ours, theirs in zip(align(tracks, (3, 5, 0)), align(tracks, (0, 2, -3)), strict=True):
-        np.testing.assert_array_equal(ours, theirs)
-
-
+@settings(max_examples=30)
 @given(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9), st.floats(1e-6, 1e6), st.floats(1e-6, 1e6))
 def test_far_lags_and_fast_rates_are_no_trouble(first, second, slow, fast):
     with warnings.catch_warnings(action="error"):
@@ -47,13 +38,6 @@ def test_far_lags_and_fast_rates_are_no_trouble(first, second, slow, fast):
     assert (ours == 1).all()
     if second - first > 9:
         assert np.isnan(theirs).all()
-
-
-def test_only_ratios_of_rates_count(motion):
-    tracks = filmed(motion, (40, 40, 40), (0, 0, 0))
-    ours, theirs = (align(tracks, (0, 1, 2), rates) for rates in ((2, 2.4, 1), (1, 1.2, 0.5)))
-    for one, other in zip(ours, theirs, strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-12)
 
 
 @pytest.mark.parametrize("seen", [1, 2, 3, 4])
@@ -83,23 +67,10 @@ def test_cubic_motions_are_interpolated_exactly(lag, rate):
     assert shown[covered].all()
 
 
-def test_nothing_is_made_up_in_gaps(motion):
-    tracks = filmed(motion, (50, 50, 50), (0, 0, 0))
-    tracks[1][20:25] = np.nan
-    _, second, _ = align(tracks, (0, 0.5, 0))
-    hidden = np.isnan(second).any(axis=1)
-    assert np.flatnonzero(hidden).tolist() == [0, *range(20, 26)]
-
-
-# ----------------------------------------------------------------------------------------- learning
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("keep", [0, 2])
-def test_fractional_lags_and_different_lengths(motion, keep):
+def test_fractional_lags_and_different_lengths(motion):
     lags = (0, 7.4, -12.7)
     tracks = filmed(motion, (250, 230, 240), lags)
-    found = learn_lags(tracks, motion[1].uncalibrated(keep))
+    found = learn_lags(tracks, motion[1].uncalibrated(2))
     assert found.agree
     assert found.warnings == ()
     pulls = (found.frames - lags)[1:] / found.errors[1:]
@@ -108,25 +79,12 @@ def test_fractional_lags_and_different_lengths(motion, keep):
     assert found.errors[0] == 0
 
 
-@pytest.mark.parametrize(
-    "lags", [(0, 0, 0), (0, 7, 0), pytest.param((0, -20, 35), marks=pytest.mark.slow)]
-)
-def test_whole_lags_come_out_whole(motion, lags):
-    found = learn_lags(filmed(motion, (250, 240, 230), lags), motion[1].uncalibrated())
-    assert found.frames.tolist() == list(lags)
+def test_whole_lags_come_out_whole_and_a_small_fraction_is_not_rounded_away(motion):
+    found = learn_lags(filmed(motion, (250, 240, 230), (0, 7, 0)), motion[1].uncalibrated())
+    assert found.frames.tolist() == [0, 7, 0]
     assert found.residual < 5 * NOISE
-
-
-def test_a_small_fraction_is_not_rounded_away(motion):
     found = learn_lags(filmed(motion, (250,) * 3, (0, 0.1, 0)), motion[1].uncalibrated())
     np.testing.assert_allclose(found.frames, (0, 0.1, 0), atol=0.01)
-
-
-def test_different_frame_rates_of_known_cameras(motion):
-    lags, rates = (0, 10.3, -20), (1, 1.2, 0.5)
-    tracks = filmed(motion, (200, 220, 110), lags, rates)
-    found = learn_lags(tracks, motion[1], rates)
-    np.testing.assert_allclose(found.frames, lags, atol=0.02)
 
 
 def test_errors_are_those_of_least_squares(motion):
@@ -146,62 +104,11 @@ def test_errors_are_those_of_least_squares(motion):
     np.testing.assert_allclose(found.errors[1:], np.sqrt(np.diag(covariance)), rtol=0.1)
 
 
-def test_a_start_that_is_some_frames_off_is_mended(motion):
-    """Further than a frame the slope does not hold: there it takes several steps."""
-    path, rig = motion
-
-    def slow(frame):
-        return path(frame / 20)
-
-    tracks = filmed((slow, rig), (250,) * 3, (0, 3, 0), noise=0.001)
-    found = learn_lags(tracks, rig)
-    np.testing.assert_allclose(found.frames, (0, 3, 0), atol=0.01)
-    assert found.warnings == ()
-
-
-def test_calibrated_rig_and_outliers(motion):
-    tracks = filmed(motion, (250, 250, 250), (0, 7, -4))
-    for i, track in enumerate(tracks):
-        track[20 + i :: 50] += 60  # jumps of the tracker, in up to six frames of a hundred
-    found = learn_lags(tracks, motion[1])
-    np.testing.assert_allclose(found.frames, (0, 7, -4), atol=0.02)
-    assert found.errors.max() < 0.01
-
-
-def test_lags_count_from_the_first_video_whichever_camera_is_known(motion):
-    tracks = filmed(motion, (150, 150, 150), (0, 7, 12), noise=0.0)
-    found = learn_lags(tracks, motion[1].uncalibrated(2))
-    np.testing.assert_allclose(found.frames, [0, 7, 12], atol=1e-6)
-
-
-@pytest.mark.slow
 def test_a_camera_without_a_position(motion):
     first, second, third = motion[1].uncalibrated().cameras
     rig = vl.Rig([first, replace(second, position=None), third])
-    found = learn_lags(filmed(motion, (250, 250, 250), (0, 7, -4)), rig)
+    found = learn_lags(filmed(motion, (150,) * 3, (0, 7, -4)), rig)
     assert found.frames.tolist() == [0, 7, -4]
-
-
-@pytest.mark.slow
-def test_perspective_cameras():
-    x = trajectory(np.random.default_rng(5), 300)
-    middle, reach = x.mean(axis=0), np.linalg.norm(np.ptp(x, axis=0))
-    cameras = [
-        vl.PerspectiveCamera(
-            position=middle + 3 * reach * camera.normal,
-            normal=camera.normal,
-            scale=camera.scale / (3 * reach),
-            angle=camera.angle,
-        )
-        for camera in vl.Rig.around(x).cameras
-    ]
-    tracks = [camera.project(x) for camera in cameras]
-    tracks[1] = tracks[1][9:]
-    found = learn_lags(tracks, vl.Rig(cameras).uncalibrated())
-    np.testing.assert_allclose(found.frames, (0, 9, 0), atol=1e-6)
-
-
-# ------------------------------------------------------------------------ what cannot be told apart
 
 
 def periodic(k):
@@ -233,32 +140,11 @@ def test_a_target_that_hardly_moves_tells_no_lag():
     assert all("the target moves too little or too slowly" in w for w in found.warnings)
 
 
-def test_noise_of_the_tracks_is_no_reason_to_look_for_other_lags(motion, monkeypatch):
-    """However large; what follows the motion is, however small."""
-    tracks = filmed(motion, (250,) * 3, (0, 0, 0), noise=1.5)
-    searched = []
-    monkeypatch.setattr(synchrony, "_searched", lambda *_: searched.append(1) or (False, []))
-    found = learn_lags(tracks, motion[1])
-    assert found.residual > 1
-    assert found.agree
-    assert found.frames.tolist() == [0, 0, 0]
-    assert not searched
-    first, second, third = motion[1].cameras
-    turned = replace(second, normal=second.normal + 0.02 * second.rows[0])
-    quiet = filmed(motion, (250,) * 3, (0, 0, 0))
-    learn_lags(quiet, vl.Rig([first, turned, third]))
-    assert searched
-
-
-@pytest.mark.slow
 def test_lags_that_are_given_are_the_start(motion):
-    tracks = filmed(motion, (250,) * 3, (0, 7, 0))
+    tracks = filmed(motion, (150,) * 3, (0, 7, 0))
     rig = motion[1].uncalibrated()
     assert learn_lags(tracks, rig, start=(1, 8, 1)).frames.tolist() == [0, 7, 0]
     assert learn_lags(tracks, rig, start=(0, 60, 0)).frames.tolist() == [0, 7, 0]
-
-
-# ------------------------------------------------------------------------- rigs as people have them
 
 
 def room(seed, frames, lags=(0, 0, 0), drifts=(0, 0, 0), noise=0.5):
@@ -294,12 +180,10 @@ def measured_by_hand(rig, seed):
     ])  # fmt: skip
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2))
-def test_lags_at_half_a_pixel_of_noise(seed):
+def test_lags_at_half_a_pixel_of_noise():
     lags = (0, 31.4, -22.7)
-    rig, tracks = room(seed, 200, lags)
-    for known, limit in ((rig, 0.05), (rig.uncalibrated(), 0.05), (measured_by_hand(rig, 0), 0.3)):
+    rig, tracks = room(0, 200, lags)
+    for known, limit in ((rig.uncalibrated(), 0.05), (measured_by_hand(rig, 0), 0.3)):
         found = learn_lags(tracks, known)
         assert found.agree
         assert found.warnings == ()
@@ -318,25 +202,9 @@ def test_a_wrong_rig_does_not_spoil_the_lags(motion):
     np.testing.assert_allclose(found.frames, (0, 9.3, -4), atol=0.05)
 
 
-@pytest.mark.parametrize(
-    ("tilt", "noise", "doubted"), [(0.003, 0.05, True), (0, 0.5, False), (0, 3.0, False)]
-)
-def test_a_rig_is_doubted_if_it_leaves_more_than_the_tracks_do(motion, tilt, noise, doubted):
-    """However much that is: cameras that may turn only take out what a tilt leaves."""
-    first, second, third = motion[1].cameras
-    turned = replace(second, normal=second.normal + tilt * second.rows[0])
-    tracks = filmed(motion, (80,) * 3, (0, 2, 0), noise=noise)
-    videos = synchrony._Videos(Footage.of(tracks), (first, turned, third))
-    loose, (best, *_) = synchrony._searched(videos, np.zeros(3))
-    assert loose is doubted
-    assert best.score < max(1, 2 * noise)
-    np.testing.assert_allclose(best.lags, (0, 2, 0), atol=max(0.1, 0.2 * noise))
-
-
-@pytest.mark.slow
 def test_motions_that_have_nothing_in_common_have_no_lags():
-    rig, tracks = room(0, 150)
-    _, others = room(7, 150)
+    rig, tracks = room(0, 80)
+    _, others = room(7, 80)
     found = learn_lags([tracks[0], others[1], tracks[2]], rig)
     assert not found.agree
     assert found.frames.tolist() == [0, 0, 0]
@@ -345,42 +213,12 @@ def test_motions_that_have_nothing_in_common_have_no_lags():
     assert "no lags of the videos make the views agree: (0, 0, 0) frames were taken" in warning
 
 
-@pytest.mark.slow
 def test_the_drift_of_a_clock_is_found():
     rig, tracks = room(3, 1500, (0, 12.4, -3.3), (0, 4e-4, 0))
     found = learn_lags(tracks, rig)
     np.testing.assert_allclose(found.rates, (1, 1 + 4e-4, 1), rtol=0, atol=1.2e-4)
     assert found.rates[2] == 1  # what is not clear is not changed
     np.testing.assert_allclose(found.frames, (0, 12.4, -3.3), atol=0.15)
-
-
-def test_a_motion_that_repeats_itself_is_told_though_a_clock_drifts():
-    """By a frame over the whole video: no lag makes the views agree before the drift is known."""
-    rig = vl.Rig.around(periodic(np.arange(61)))
-    tracks = filmed((periodic, rig), (1000,) * 3, (0, 20, 5), (1, 1.001, 1))
-    found = learn_lags(tracks, rig)
-    assert found.agree
-    assert "because the motion repeats itself" in found.warnings[0]
-    periods = (found.frames - (0, 20, 5)) / 60.3
-    np.testing.assert_allclose(periods, np.rint(periods), atol=1e-3)
-    np.testing.assert_allclose(found.rates, (1, 1.001, 1), atol=2e-5)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("outliers", [0, 0.03])
-def test_errors_of_lags_are_honest(motion, outliers):
-    """With outliers, too: interpolation carries a part of them into the frames beside."""
-    pulls = []
-    for seed in range(12):
-        rng = np.random.default_rng(100 + seed)
-        lags = (0, *rng.uniform(-3, 3, 2))
-        tracks = filmed(motion, (250,) * 3, lags, noise=0.0)
-        for track in tracks:
-            track += 0.3 * rng.normal(size=track.shape)
-            track[rng.random(len(track)) < outliers] += 50
-        found = learn_lags(tracks, motion[1], start=lags)
-        pulls += ((found.frames - lags) / np.maximum(found.errors, 1e-9))[1:].tolist()
-    assert 0.6 < np.sqrt(np.mean(np.square(pulls))) < 1.5
 
 
 def test_noise_tells_no_lag_and_motion_does(motion):
@@ -392,18 +230,8 @@ def test_noise_tells_no_lag_and_motion_does(motion):
         assert learn_lags(tracks, rig).agree == told
 
 
-def test_outliers_do_not_count_as_disagreement(motion):
-    tracks = filmed(motion, (250,) * 3, (0, 0, 0))
-    quiet = disagreement(tracks, motion[1])
-    tracks[0][::20] += 50
-    assert max(disagreement(tracks, motion[1])) < 1.5 * max(quiet)
-
-
 def test_lags_as_text():
     assert list_lags(np.array([0.0, 7.0, -12.504, -1e-9])) == "0, 7, -12.5, 0"
-
-
-# ---------------------------------------------------------------------------------------- bad input
 
 
 @pytest.mark.parametrize(
@@ -415,33 +243,23 @@ def test_lags_as_text():
         ({"rates": (1, 1, 1e-310)}, r"rates: must be between 1e-06 and 1e\+06, got 1e-310"),
         ({"start": (0, -1e300, 0)}, r"start: must be at most 1e\+09 frames, got 1e\+300"),
         ({"start": (0, np.nan, 0)}, "start: must be 3 finite numbers"),
+        ({"start": (0, 1)}, "start: must be 3 finite numbers"),
     ],
 )
 def test_bad_input_is_named(motion, arguments, message):
     tracks = filmed(motion, (30,) * 3, (0, 0, 0))
     with pytest.raises(ValueError, match=message):
         learn_lags(tracks, motion[1], **arguments)
-
-
-def test_one_track_per_camera_and_lag(motion):
-    tracks = filmed(motion, (30,) * 3, (0, 0, 0))
-    with pytest.raises(ValueError, match="tracks: must be one per camera, got 2 for 3 cameras"):
-        learn_lags(tracks[:2], motion[1])
-    with pytest.raises(ValueError, match="lags: must be 3 finite numbers"):
-        align(tracks, (0, 1))
     with pytest.raises(ValueError, match=r"lags: must be at most 1e\+09 frames, got 1e\+300"):
         align(tracks, (0, 1e300, 0))
 
 
-@pytest.mark.parametrize("blind", [0, 2])
-def test_a_camera_that_never_sees_the_target(motion, blind):
+def test_a_camera_that_never_sees_the_target(motion):
+    blind = 2
     tracks = filmed(motion, (30,) * 3, (0, 0, 0))
     tracks[blind][::2, 0] = tracks[blind][1::2, 1] = np.nan  # half a pixel tells nothing
     with pytest.raises(ValueError, match=rf"tracks\[{blind}\]: must see the target in some frame"):
         learn_lags(tracks, motion[1])
-
-
-# ------------------------------------------------------------------------------------ uneven clocks
 
 
 def uneven(rng, frames):
@@ -460,17 +278,11 @@ def filmed_at(motion, clocks, lags, rates):
 UNEVEN_LAGS = np.array([0, 7.3, -4.6])
 
 
-def filmed_unevenly(motion, rates, seed):
-    rng = np.random.default_rng(seed)
+def test_lags_of_uneven_videos_are_found(motion):
+    rates, rng = (1, 1.5, 0.8), np.random.default_rng(0)
     clocks = [uneven(rng, int(200 * rate)) for rate in rates]
     clocks = [clock - clock[0] for clock in clocks]
-    return clocks, filmed_at(motion, clocks, UNEVEN_LAGS, rates)
-
-
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("rates", [(1, 1, 1), (1, 1.5, 0.8)])
-def test_lags_of_uneven_videos_are_found(motion, seed, rates):
-    clocks, tracks = filmed_unevenly(motion, rates, seed)
+    tracks = filmed_at(motion, clocks, UNEVEN_LAGS, rates)
     found = learn_lags(tracks, motion[1].uncalibrated(0), rates, clocks=clocks)
     np.testing.assert_allclose(found.frames, UNEVEN_LAGS, atol=2e-3)
     assert found.warnings == ()
@@ -482,29 +294,11 @@ def test_lags_of_uneven_videos_are_found(motion, seed, rates):
         assert np.abs(track - true)[both].max() < 0.05
 
 
-@pytest.mark.parametrize("rates", [(1, 1, 1), (1, 1.5, 0.8)])
-def test_as_if_they_were_even_uneven_videos_agree_nowhere_near_as_well(motion, rates):
-    clocks, tracks = filmed_unevenly(motion, rates, 0)
-    rig = motion[1].uncalibrated(0)
-    found = learn_lags(tracks, rig, rates, clocks=clocks)
-    assert learn_lags(tracks, rig, rates).residual > 3 * found.residual
-
-
 def test_a_long_pause_of_a_camera_is_not_interpolated(motion):
     clocks = [np.arange(60.0), np.delete(np.arange(60.0), [10, 30, 31]), np.arange(60.0)]
     tracks = filmed_at(motion, clocks, (0, 0, 0), (1, 1, 1))
     _, second, _ = align(tracks, (0, 0, 0), clocks=clocks)
     assert np.flatnonzero(np.isnan(second[:, 0])).tolist() == [30, 31]
-
-
-def test_even_clocks_are_the_default(motion):
-    tracks = filmed(motion, (100, 90, 120), (0, 7, -3), (1, 1.2, 0.9))
-    clocks = [np.arange(len(track)) for track in tracks]
-    for lags in ((0, 7, -3), (0, 7.25, -3.5)):
-        for rates in ((1, 1, 1), (1, 1.2, 0.9)):
-            ours, theirs = (align(tracks, lags, rates, given) for given in (clocks, None))
-            for one, other in zip(ours, theirs, strict=True):
-                np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize(
@@ -520,11 +314,7 @@ def test_clocks_that_are_none(clocks, message):
         align([np.ones((3, 2))] * 2, (0, 0), clocks=clocks)
 
 
-# -------------------------------------------------------------------------------- rolling shutters
-
-
-@pytest.mark.parametrize("known", [True, False])
-def test_lags_and_rolling_shutters_are_told_apart(known):
+def test_lags_and_rolling_shutters_are_told_apart():
     """Both move a track in time, the one by where the target is."""
     rng = np.random.default_rng(8)
     rig, lags, frames = helpers.room(rng, 4, readout=0.4), (0, 6.3, -4.6, 0.5), np.arange(400)
@@ -535,29 +325,10 @@ def test_lags_and_rolling_shutters_are_told_apart(known):
             late = camera.readout * (seen[:, 1] - 359.5) / 720
             seen = camera.project(helpers.walk(2 * (frames + lag + late)))
         tracks.append(seen + 0.2 * rng.normal(size=seen.shape))
-    if not known:
-        rig = vl.Rig(replace(c, readout=0.0, readout_error=0.5) for c in rig.cameras)
+    rig = vl.Rig(replace(c, readout=0.0, readout_error=0.5) for c in rig.cameras)
     found = learn_lags(tracks, rig)
     assert found.agree
-    np.testing.assert_allclose(found.frames, lags, atol=0.05 if known else 0.1)
-
-
-LAG, DRIFT = PARTS["lag"][0], PARTS["drift"][0]
-
-
-def fitted(motion, lags=(0, 0, 0), frames=120, rates=(1, 1, 1), **more):
-    """A known rig, and nothing known of lags."""
-    tracks = filmed(motion, (frames,) * 3, lags, rates, **more)
-    errors = np.zeros((3, SIZE))
-    errors[1:, LAG] = np.inf
-    return Timing.of(adjust(Footage.of(tracks), motion[1].cameras, errors))
-
-
-def missing(timing, misses):
-    """The same, if residuals were these."""
-    fit = replace(timing.fit)
-    fit.misses, fit.weights = misses, np.ones(len(misses))
-    return Timing(fit)
+    np.testing.assert_allclose(found.frames, lags, atol=0.1)
 
 
 @pytest.mark.parametrize(
@@ -569,17 +340,9 @@ def test_noise_agrees_and_what_persists_does_not(motion, size, memory, agrees):
     """Noise however large, unless it is gross; what is like the next frame's, if it is small."""
     rng = np.random.default_rng(0)
     misses = size * np.hstack([dependent(rng, 400, memory) for _ in range(3)])
-    assert missing(fitted(motion), misses / 2).agrees is agrees
-
-
-def test_a_clock_that_drifts_clearly_is_freed_and_no_other(motion):
-    """By half a frame in 250, twenty times its error; the third one's stays even."""
-    rate = 1 + 0.5 / 250
-    plain = fitted(motion, frames=250, rates=(1, rate, 1))
-    drifted = plain.drifted()
-    drift = drifted.fit.change[:, DRIFT]
-    assert drift[1] == pytest.approx(-0.5, rel=0.05)
-    assert drift[[0, 2]].tolist() == [0, 0]
-    assert drifted.fit.left() < 0.7 * plain.fit.left()
-    even = fitted(motion, frames=250)
-    assert even.drifted() is even
+    tracks = filmed(motion, (120,) * 3, (0, 0, 0))
+    errors = np.zeros((3, SIZE))
+    errors[1:, PARTS["lag"]] = np.inf
+    fit = replace(adjust(Footage.of(tracks), motion[1].cameras, errors))
+    fit.misses, fit.weights = misses / 2, np.ones(len(misses))
+    assert Timing(fit).agrees is agrees

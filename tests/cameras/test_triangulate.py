@@ -1,7 +1,5 @@
 """Lines of sight against OpenCV, scipy and points found by hand."""
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from vidsindy_lite.cameras import (
     PerspectiveCamera,
     Rig,
     reconstruct,
-    residuals,
 )
 from vidsindy_lite.cameras.rig import epipolar_lines, epipolar_rows, intersect
 
@@ -91,12 +88,7 @@ def test_one_view_or_none_gives_no_point():
     missing = np.isnan(found).all(axis=1)
     assert np.flatnonzero(missing).tolist() == [3, 5]
     np.testing.assert_allclose(found[~missing], x[~missing], atol=1e-9 * np.ptp(x))
-
-
-@pytest.mark.parametrize("kind", [OrthographicCamera, PerspectiveCamera])
-def test_one_camera_alone_gives_no_point(kind):
-    _, cameras, tracks = scene(kind)
-    assert np.isnan(intersect(cameras, tracks)[0]).all()
+    assert np.isnan(intersect(cameras[:1], tracks[:1])[0]).all()
 
 
 def test_lines_that_meet_behind_a_camera_give_no_point():
@@ -136,47 +128,3 @@ def test_epipolar_lines_as_opencv(kinds):
         design, target = epipolar_rows(ours, other, moved)
         missed = np.abs(design @ unit - target) / other.scale
         np.testing.assert_allclose(missed, distance, atol=1e-4)
-
-
-def test_epipolar_equations_leave_out_what_is_not_seen():
-    _, (known, other, _), (seen, pixels, _) = scene(*KINDS[1])
-    seen[4] = np.nan
-    pixels[6] = np.nan
-    normals, constants = lines = epipolar_lines(known, seen, other)
-    assert np.flatnonzero(np.isnan(constants)).tolist() == [4]
-    assert np.flatnonzero(np.isnan(normals).any(axis=1)).tolist() == [4]
-    design, target = epipolar_rows(lines, other, pixels)
-    told = np.isfinite(design).all(axis=1) & np.isfinite(target)
-    assert np.flatnonzero(~told).tolist() == [4, 6]
-    # A camera at the same place sees every line of sight as a point: it cannot disagree.
-    twin = PerspectiveCamera(position=known.position, normal=other.normal, scale=1, angle=0)
-    assert np.isnan(epipolar_lines(known, seen, twin)[1]).all()
-
-
-def test_the_unit_of_length_does_not_move_an_epipolar_line():
-    _, (known, other, _), (seen, _, _) = scene(*KINDS[1])
-    lines = epipolar_lines(known, seen, other)
-    for unit in (1e-5, 1e5):
-        tiny = [replace(c, position=unit * c.position) for c in (known, other)]
-        for ours, theirs in zip(epipolar_lines(tiny[0], seen, tiny[1]), lines, strict=True):
-            np.testing.assert_allclose(ours, theirs, rtol=1e-6)
-
-
-@pytest.mark.parametrize(("apart", "told"), [(1.3e-6, False), (2e-6, True)])
-def test_cameras_that_hardly_stand_apart_cannot_disagree(apart, told):
-    # The line of sight, at 45 degrees, comes closest to the origin .71 deep and .71 aside. What the
-    # cameras are apart shows as .71 of that, and counts from 1e-6 (.71 + .71 * .71) on.
-    half = np.sqrt(0.5)
-    place = {"normal": (0, 0, 1), "scale": 1.0, "angle": 0.0, "image_size": (1, 1)}
-    known = PerspectiveCamera(position=(-half, 0, half), **place)
-    other = PerspectiveCamera(position=(-half, apart, half), **place)
-    assert np.isfinite(epipolar_lines(known, np.array([[1.0, 0.0]]), other)[1]).all() == told
-
-
-def test_residuals_are_track_minus_projection():
-    x, cameras, tracks = scene(*KINDS[3])
-    apart = np.array([2.0, -1.0])
-    three = residuals([tracks[0] + apart, *tracks[1:]], Rig(cameras))
-    moved = reconstruct([tracks[0] + apart, *tracks[1:]], Rig(cameras))
-    np.testing.assert_allclose(three[0], tracks[0] + apart - cameras[0].project(moved), atol=1e-9)
-    np.testing.assert_allclose(three[1], tracks[1] - cameras[1].project(moved), atol=1e-9)

@@ -1,7 +1,6 @@
 """Errors that all samples share: told by the rig, counted in by the law."""
 
 import numpy as np
-import pytest
 from helpers import dependent, trajectory
 
 import vidsindy_lite as vl
@@ -23,10 +22,10 @@ def learned_rig(rng, memory, frames=250, path=trajectory):
     return modes, x, learned
 
 
-@pytest.mark.parametrize("memory", [0.0, pytest.param(0.6, marks=pytest.mark.slow)])
-def test_errors_of_cameras_are_as_large_as_stated(memory):
+def test_errors_of_cameras_are_as_large_as_stated():
+    memory = 0.6
     pulls = []
-    for seed in np.random.SeedSequence(5).spawn(15):
+    for seed in np.random.SeedSequence(5).spawn(12):
         modes, x, learned = learned_rig(np.random.default_rng(seed), memory)
         # What the cameras' errors do to the path, in units of what they may do.
         turned = vl.reconstruct([c.project(x) for c in vl.Rig.around(x).cameras], learned) - x
@@ -48,60 +47,12 @@ def throw(rng, frames):
 def test_errors_of_cameras_that_saw_one_short_throw_are_not_understated():
     """In 60 frames, chance alone makes the scores of residuals look like less than their noise."""
     pulls = []
-    for seed in np.random.SeedSequence(6).spawn(60):
+    for seed in np.random.SeedSequence(6).spawn(40):
         modes, x, learned = learned_rig(np.random.default_rng(seed), 0.0, 60, throw)
         turned = vl.reconstruct([c.project(x) for c in vl.Rig.around(x).cameras], learned) - x
         sizes, *_ = np.linalg.lstsq(modes.reshape(len(modes), -1).T, turned.ravel())
         pulls.append(sizes)
     assert 0.8 < np.sqrt(np.mean(np.square(pulls))) < 1.1
-
-
-def test_known_cameras_share_no_errors():
-    x = trajectory(np.random.default_rng(1), 50)
-    rig = vl.Rig.around(x)
-    tracks = [camera.project(x) for camera in rig.cameras]
-    still = Lags(np.zeros(3), np.ones(3), np.zeros(3), 0.0)
-    assert systematic_errors(tracks, rig, rig, still).shape == (0, 50, 3)
-
-
-def trailing(rig, x, trail, noise=NOISE, seed=0):
-    """Tracks that stay behind the motion by so many pixels."""
-    rng = np.random.default_rng(seed)
-    clean = [camera.project(x) for camera in rig.cameras]
-    steps = [np.gradient(track, axis=0) for track in clean]
-    return [
-        track - trail * step / np.linalg.norm(step, axis=1, keepdims=True)
-        + noise * rng.normal(size=track.shape)
-        for track, step in zip(clean, steps, strict=True)
-    ]  # fmt: skip
-
-
-def test_no_trail_where_nothing_moves_or_is_seen():
-    x = trajectory(np.random.default_rng(4), 100)
-    x[40:60] = x[40]
-    rig = vl.Rig.around(x)
-    tracks = [camera.project(x) for camera in rig.cameras]
-    for track in tracks:
-        track[80:] = np.nan
-    tracks[0][:20] += NOISE * np.random.default_rng(0).normal(size=(20, 2))
-    modes = tracking_errors(tracks, rig)
-    assert np.isfinite(modes).all()
-    np.testing.assert_allclose(modes[:, 41:59], 0, atol=1e-12)
-    np.testing.assert_array_equal(modes[:, 80:], 0)
-
-
-@pytest.mark.slow
-def test_trailing_tracks_make_false_terms_unless_it_is_told():
-    truth = study.SYSTEMS["SprottF"].shift(study.REFERENCE_OFFSET)
-    t, x = truth.trajectory(600)
-    rig = vl.Rig.around(x)
-    tracks = trailing(rig, x, 0.5 * NOISE)
-    seen = vl.reconstruct(tracks, rig)
-    blind = vl.discover(t, seen)
-    told = vl.discover(t, seen, systematic=tracking_errors(tracks, rig))
-    assert study.score(blind, truth).false_positives > 0
-    assert study.score(told, truth).exact
-    assert told.status == "ok"
 
 
 def test_trails_follow_the_motion():
@@ -148,31 +99,14 @@ def test_a_lag_moves_the_path_as_far_as_it_may_be_wrong():
     assert least < abs(size) < 5 * least
 
 
-def test_gross_outliers_do_not_move_the_errors_of_cameras():
-    rng = np.random.default_rng(8)
-    x = trajectory(rng, 150)
-    truth = vl.Rig.around(x)
-    rig = truth.uncalibrated()
-    tracks = [c.project(x) + NOISE * rng.normal(size=(150, 2)) for c in truth.cameras]
-    learned = vl.learn_cameras(tracks, rig)
-    still = Lags(np.zeros(3), np.ones(3), np.zeros(3), 0.0)
-
-    def sizes():
-        modes = systematic_errors(tracks, rig, learned, still).reshape(4, -1)
-        return np.linalg.svd(modes, compute_uv=False)
-
-    clean = sizes()
-    tracks[0][70] += 40
-    tracks[2][20] -= 40
-    np.testing.assert_allclose(sizes(), clean, rtol=0.1)
-
-
 def test_lags_that_are_exact_or_unknown_move_nothing():
     x = trajectory(np.random.default_rng(9), 60)
     rig = vl.Rig.around(x)
     tracks = [camera.project(x) for camera in rig.cameras]
     lags = Lags(np.zeros(3), np.ones(3), np.array([0, 0, np.inf]), 0.0)
     assert systematic_errors(tracks, rig, rig, lags).shape == (0, 60, 3)
+    still = Lags(np.zeros(3), np.ones(3), np.zeros(3), 0.0)
+    assert systematic_errors(tracks, rig, rig, still).shape == (0, 60, 3)
 
 
 def test_a_clock_that_may_drift_moves_the_path_at_both_ends():

@@ -9,7 +9,6 @@ from helpers import aligned_error, room, walk
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import AffineCamera, factorised, learn_cameras_eq4, posed
 from vidsindy_lite.pipeline import observe_tracks
-from vidsindy_lite.study import SYSTEMS
 
 FRAMES = 240
 
@@ -33,26 +32,6 @@ def filmed(rng, rig, late=(0.0,) * 5, noise=0.5):
         c.project(walk(np.arange(FRAMES) + lag)) for c, lag in zip(rig.cameras, late, strict=False)
     ]
     return [track + noise * rng.normal(size=track.shape) for track in tracks]
-
-
-@pytest.mark.parametrize(("seed", "cameras"), [(0, 3), (1, 4)])
-def test_the_path_is_found_but_for_a_similarity(seed, cameras):
-    rng = np.random.default_rng([seed, cameras])
-    rig = room(rng, cameras)
-    x, tracks = walk(np.arange(FRAMES)), filmed(rng, rig)
-    learned = vl.learn_cameras(tracks, lenses(rng, rig))
-    assert learned.warnings == ()
-    size = np.ptp(x, axis=0).max()
-    # No mirror image: `aligned_error` allows for none.
-    assert aligned_error(vl.reconstruct(tracks, learned), x) < 0.005 * size
-
-
-def test_exact_tracks_and_lenses_give_the_exact_rig():
-    rng = np.random.default_rng(7)
-    rig = room(rng)
-    x, tracks = walk(np.arange(FRAMES)), filmed(rng, rig, noise=0.0)
-    learned = vl.learn_cameras(tracks, lenses(rng, rig, off=0.0))
-    assert aligned_error(vl.reconstruct(tracks, learned), x) < 1e-6
 
 
 def test_the_frame_is_that_of_the_first_camera_and_is_told():
@@ -88,26 +67,6 @@ def test_a_known_distance_gives_the_unit_of_length():
     assert "the first camera is" in seen.rig.note
 
 
-@pytest.mark.slow
-def test_a_law_has_its_own_axes_though_nobody_has_measured_the_rig():
-    rng = np.random.default_rng(4)
-    rig = room(rng)
-    t, x = SYSTEMS["SprottF"].trajectory(500)
-    shown = 0.25 * (x - x.mean(axis=0)) / x.std() + walk(np.arange(FRAMES)).mean(axis=0)
-    tracks = [c.project(shown) + 0.5 * rng.normal(size=(len(t), 2)) for c in rig.cameras]
-    found = vl.discover_from_tracks(
-        tracks, lenses(rng, rig), t, lags=[0, 0, 0], degree=2, order=1, orientation="learn"
-    )
-    assert found.status == "ok"
-    law = found.discovery
-    assert law.native.support.sum() == SYSTEMS["SprottF"].support.sum()
-    assert "axes: turned" in str(found)
-    # The law is in its own axes, what cameras see of it in those of the rig.
-    assert np.sqrt(np.nanmean((found.fitted - found.x) ** 2)) < 0.02 * np.nanstd(found.x)
-    states = law.curve(found.t)
-    np.testing.assert_allclose(states @ law.orientation, found.fitted)
-
-
 def test_small_lags_are_learned_beside():
     rng = np.random.default_rng(3)
     rig, late = room(rng, 4), (0, 0.7, -0.9, 0.3)
@@ -117,23 +76,6 @@ def test_small_lags_are_learned_beside():
     x = walk(np.arange(FRAMES))
     inside = np.isfinite(seen.x).all(axis=1)
     assert aligned_error(seen.x[inside], x[inside]) < 0.005 * np.ptp(x, axis=0).max()
-
-
-def test_a_line_tells_no_rig():
-    rng = np.random.default_rng(4)
-    rig = room(rng)
-    x = np.outer(np.sin(np.arange(400) / 40), [0.5, 0.3, 0.2])
-    tracks = [c.project(x) + 0.5 * rng.normal(size=(400, 2)) for c in rig.cameras]
-    warnings = vl.learn_cameras(tracks, lenses(rng, rig)).warnings
-    assert any("the search for the cameras did not converge" in text for text in warnings)
-
-
-def test_tracks_at_other_instants_tell_no_rig():
-    rng = np.random.default_rng(4)
-    rig = room(rng)
-    tracks = filmed(rng, rig, (0, 60, -45))
-    with pytest.raises(ValueError, match="rig: the tracks must tell where the cameras stand"):
-        posed(tracks, lenses(rng, rig))
 
 
 def of_lenses(rig, times):
@@ -151,7 +93,7 @@ def blind(rig, known=0):
     )
 
 
-@pytest.mark.parametrize(("times", "known"), [(1, 0), (1, 1), (6, 0)])
+@pytest.mark.parametrize(("times", "known"), [(1, 1), (6, 0)])
 def test_nothing_is_known_at_all(times, known):
     rng = np.random.default_rng([5, times])
     rig = of_lenses(room(rng), times)
@@ -178,19 +120,6 @@ def test_from_infinity_either_hand_fits():
     assert any("true one or its mirror image" in text for text in learned.warnings)
     found, size = vl.reconstruct(tracks, learned), np.ptp(x, axis=0).max()
     assert min(aligned_error(found * [1, 1, hand], x) for hand in (1, -1)) < 0.01 * size
-    seen = observe_tracks(tracks, blind(rig), np.arange(FRAMES) / 30)
-    assert any("true one or its mirror image" in text for text in seen.warnings)
-
-
-def test_a_small_target_before_cameras_far_apart():
-    """OpenCV refuses points that are close together, in whatever unit."""
-    rng = np.random.default_rng(8)
-    rig = of_lenses(room(rng), 30)
-    x = walk(np.arange(FRAMES))
-    x[: FRAMES // 3] = x[0]  # and at rest
-    tracks = [c.project(x) + 0.2 * rng.normal(size=(FRAMES, 2)) for c in rig.cameras]
-    learned = posed(tracks, lenses(rng, rig, off=0.02))
-    assert aligned_error(vl.reconstruct(tracks, learned), x) < 0.01 * np.ptp(x, axis=0).max()
 
 
 def test_a_file_of_lenses(tmp_path):
@@ -244,7 +173,7 @@ def far_away(views=3, moving=3, noise=0.2, count=240, seed=0):
     return tracks, vl.Rig(tuple(vl.PerspectiveCamera() for _ in range(views)))
 
 
-@pytest.mark.parametrize(("views", "moving"), [(3, 3), (3, 2), (4, 3)])
+@pytest.mark.parametrize(("views", "moving"), [(3, 2), (4, 3)])
 def test_lags_and_axes_of_motion(views, moving):
     tracks, rig = far_away(views, moving)
     found = factorised(tracks, rig, np.ones(views), None)
@@ -254,36 +183,26 @@ def test_lags_and_axes_of_motion(views, moving):
     assert found.lags.residual < 0.3
 
 
-def test_given_lags_are_kept():
-    tracks, rig = far_away()
-    found = factorised(tracks, rig, np.ones(3), None, LAGS[:3])
-    np.testing.assert_array_equal(found.lags.frames, LAGS[:3])
-    assert found.lags.residual < 0.3
-
-
 def test_views_of_different_things_do_not_agree():
-    tracks, rig = far_away()
+    tracks, rig = far_away(count=120)
     rng = np.random.default_rng(1)
-    tracks[2] = np.cumsum(rng.normal(size=(240, 2)), axis=0) * 10
+    tracks[2] = np.cumsum(rng.normal(size=(120, 2)), axis=0) * 10
     assert factorised(tracks, rig, np.ones(3), None) is None
     with pytest.raises(ValueError, match="must tell where the cameras stand"):
-        vl.observe_tracks(tracks, rig, np.arange(240) / FPS)
+        vl.observe_tracks(tracks, rig, np.arange(120) / FPS)
 
 
-@pytest.mark.parametrize("lags", [None, np.zeros(3)])
-def test_views_with_nothing_in_common_tell_nothing(lags):
+def test_views_with_nothing_in_common_and_what_stands_still_tell_nothing():
     tracks, rig = far_away()
+    assert factorised(tracks, rig, np.ones(3), None, LAGS[:3]).lags.frames.tolist() == [*LAGS[:3]]
     tracks[1][:] = np.nan
-    assert factorised(tracks, rig, np.ones(3), None, lags) is None
-
-
-def test_what_stands_still_tells_nothing():
-    tracks, rig = far_away()
+    for lags in (None, np.zeros(3)):
+        assert factorised(tracks, rig, np.ones(3), None, lags) is None
     assert factorised([np.ones_like(track) for track in tracks], rig, np.ones(3), None) is None
 
 
-@pytest.mark.parametrize("swings", [(1.3,), (2.1, 1.3)])
-def test_the_law_of_a_swing_needs_no_rig(swings):
+def test_the_law_of_a_swing_needs_no_rig():
+    swings = 2.1, 1.3
     tracks, rig = far_away(moving=len(swings))
     found = vl.discover_from_tracks(tracks, rig, fps=FPS)
     periods = [q for q in found.discovery.physics() if q.name.startswith("period")]

@@ -99,22 +99,12 @@ def test_a_record_may_state_a_tolerance(folders, tolerance, same):
     assert list(differences(*folders)) == ([] if same else ["table_1"])
 
 
-def test_of_one_notebook_only(folders):
-    write(folders[1], rows(l2=2.0) | {"notebook": "02_second"})
-    write(folders[0], RECORD | {"notebook": "02_second"})
-    assert differences(*folders, notebook="01_first") == {}
-    assert list(differences(*folders, notebook="02_second")) == ["table_1"]
-
-
-@pytest.mark.parametrize("content", [None, "{", "[1]", "null", "{}", "[" * 100_000])
+@pytest.mark.parametrize("content", [None, "{", "null", "[" * 100_000])
 def test_what_is_on_one_side_only(folders, content):
     record = folders[0] / "fig_1.json"
     record.unlink() if content is None else record.write_text(content)  # a damaged one is none
     (folders[1] / "table_1.json").unlink()
     assert differences(*folders) == {"fig_1": "only regenerated", "table_1": "only committed"}
-
-
-# ------------------------------------------------------------------------------------------ refresh
 
 
 def refresh(committed, regenerated, notebook):
@@ -139,7 +129,6 @@ def shifted(pixels, share):
     [
         (shifted(LINE, 0.1), True),
         (np.roll(LINE, 2, axis=0), True),
-        (np.minimum(LINE.astype(int) + 3, 255).astype(np.uint8), True),
         (np.roll(LINE, 9, axis=0), False),
         (np.where(LINE == (0, 114, 178), (213, 94, 0), LINE).astype(np.uint8), False),
         (LINE[:-1], False),
@@ -151,15 +140,6 @@ def test_a_picture_is_refreshed_where_one_sees_it(folders, pixels, same):
     assert refresh(*folders, "01_first") == ([] if same else ["fig_1"])
     expected = LINE if same else pixels
     assert (folders[0] / "fig_1.png").read_bytes() == png(expected)
-
-
-def test_a_picture_of_wall_times_stays_if_the_other_numbers_do(folders):
-    for folder, seconds in zip(folders, (1.0, 2.0), strict=True):
-        write(folder, FIGURE | {"numbers": {"n": 3, "seconds": [seconds]}})
-    (folders[1] / "fig_1.png").write_bytes(png(np.roll(LINE, 9, axis=0)))
-    assert refresh(*folders, "01_first") == []
-    write(folders[1], FIGURE | {"numbers": {"n": 4, "seconds": [2.0]}})
-    assert refresh(*folders, "01_first") == ["fig_1"]
 
 
 def test_what_a_notebook_makes_no_longer_goes_and_others_things_stay(folders):
@@ -176,9 +156,6 @@ def test_two_notebooks_cannot_make_one_id(folders):
     with pytest.raises(ValueError, match="fig_1: belongs to notebook 02_second"):
         refresh(*folders, "01_first")
     assert files(folders[0]) == before
-
-
-# ---------------------------------------------------------------------------------------- notebooks
 
 
 def notebook(source="print(x)", said="x = 1.0\n", shown="<b>", count=1):
@@ -238,9 +215,6 @@ def test_what_a_cell_saves_is_compared_where_it_is_saved():
     assert not same_notebook(*others)
     printed = [notebook("print(versions())", said=f"Python 3.11.{n}\n") for n in (7, 9)]
     assert same_notebook(*printed)
-
-
-# ------------------------------------------------------------------------------------- side by side
 
 
 def test_differences_are_shown_side_by_side_and_replaced_by_the_next(folders, tmp_path):

@@ -68,8 +68,7 @@ DRAG = """(() => {
 
 
 @needs_chromium
-@pytest.mark.parametrize("width", [390, 1280])
-@pytest.mark.parametrize("drawn", ["box", "click"])
+@pytest.mark.parametrize(("width", "drawn"), [(390, "box"), (1280, "click")])
 def test_a_box_becomes_the_line_to_paste(videos, tmp_path, width, drawn):
     page = write_pick_page(videos, tmp_path / "pick.html")
     events = {

@@ -4,7 +4,6 @@ import io
 
 import av
 import numpy as np
-import pytest
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
@@ -51,7 +50,6 @@ def test_the_law_is_drawn_where_the_target_is(tmp_path):
     assert len(law_over_videos(found, paths)) < 1_000_000
 
 
-@pytest.mark.parametrize(("frames", "shown"), [(201, 101), (399, 200)])
-def test_a_long_film_is_shown_in_steps(tmp_path, frames, shown):
-    found, paths = observed(tmp_path, frames)
-    assert len(decoded(law_over_videos(found, paths))) == shown
+def test_a_long_film_is_shown_in_steps(tmp_path):
+    found, paths = observed(tmp_path, 201)
+    assert len(decoded(law_over_videos(found, paths))) == 101

@@ -1,17 +1,15 @@
 """The report: complete, readable without network, and whole or not there."""
 
 import json
-import os
 import re
 import shutil
-import subprocess
-import sys
 import warnings
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
 import jsonschema
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
@@ -182,19 +180,6 @@ def test_a_full_disk_leaves_what_was_there(case, old, tmp_path, undrawn, monkeyp
     assert not (tmp_path / "new").exists()
 
 
-def test_what_a_killed_run_has_left_is_cleared_by_the_next(case, old, undrawn):
-    gone = subprocess.Popen([sys.executable, "-c", ""])
-    gone.wait()
-    for name in FILES:
-        (old / f".{name}.{gone.pid}").write_text("left")
-        (old / f".{name}.{os.getppid()}").write_text("of a run that goes on")
-    (old / "report.html").unlink()
-    (old / "result.json").write_text('{\n "format": 1')
-    write_report(case[0], None, old)
-    hidden = {f".{name}.{os.getppid()}" for name in FILES}
-    assert {path.name for path in old.iterdir()} == {*FILES, *hidden, "thesis.tex"}
-
-
 def test_other_peoples_files_are_not_overwritten(tmp_path):
     (tmp_path / "rig.toml").write_text("")
     with pytest.raises(ValueError, match=r"out: must hold no files of the names .* with rig\.toml"):
@@ -208,47 +193,21 @@ def test_other_peoples_files_are_not_overwritten(tmp_path):
         check_folder_is_free(tmp_path / "a" / "b")
 
 
-IN_A_NOTEBOOK = """
-from types import SimpleNamespace
-import matplotlib
-import numpy as np
-from IPython.core.interactiveshell import InteractiveShell
-InteractiveShell.instance()
-from vidsindy_lite.companion import report
-t = np.linspace(0, 1, 20)
-x = np.column_stack((t, t**2, t**3))
-found = SimpleNamespace(t=t, x=x, fitted=x, targets=1)
-figures = report._figures(found, [])
-assert len(next(figures)[1]) > 1000
-figures.close()
-print("interactive:", matplotlib.is_interactive())
-"""
-
-
-def test_a_notebook_still_shows_its_figures_after_a_report():
-    environment = os.environ | {"MPLBACKEND": "module://matplotlib_inline.backend_inline"}
-    command = [sys.executable, "-c", IN_A_NOTEBOOK]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    assert "interactive: True" in done.stdout
-
-
-def test_strange_names_do_not_spoil_the_report(case, tmp_path):
+def test_strange_names_do_not_spoil_the_report_nor_it_the_figures_of_a_notebook(case, tmp_path):
     names = ["a" * 200 + r"\$a$", "line\nbreak {{ x }}", "弾む球 it's $x^$"]
     found, paths = case
     copies = [
         shutil.copy(path, tmp_path / f"{name}.mov") for name, path in zip(names, paths, strict=True)
     ]
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), plt.ion():
         warnings.simplefilter("error")
         page = write_report(found, copies, tmp_path / "report").read_text("utf-8")
+        assert plt.isinteractive()
     for name in names:
         shown = name.replace("'", "&#39;")
         assert f"<td>{shown}.mov</td>" in page
     with pytest.raises(ValueError, match="paths: must be 3 videos, got 2"):
         write_report(found, paths[:2], tmp_path / "report")
-
-
-# ---------------------------------------------------------------------------- data, and what failed
 
 
 def described():

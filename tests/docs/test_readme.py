@@ -71,22 +71,9 @@ def test_the_rig_file_is_one(tmp_path):
     assert [camera.is_calibrated for camera in rig.cameras] == [True, False, False, True]
 
 
-def test_a_line_that_does_not_run_is_seen():
-    code = blocks("python", PAGES["data"])[0].replace("vl.discover(", "vl.find(")
-    with pytest.raises(AttributeError, match="find"):
-        exec(code, {})
-
-
-# -------------------------------------------------------------------------------------------- links
-
-
 def heading_anchor(text):
     """The anchor of a heading, as code hosts make it: lower case, hyphens, no punctuation."""
     return re.sub(r"[^\w\- ]", "", re.sub(r"<[^>]*>", "", text)).strip().lower().replace(" ", "-")
-
-
-def test_anchors_are_those_of_a_code_host():
-    assert heading_anchor("Figure_S1: what it <em>shows</em>") == "figure_s1-what-it-shows"
 
 
 def dead_links(page):

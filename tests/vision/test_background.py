@@ -7,19 +7,13 @@ import pytest
 from vidsindy_lite.vision.background import (
     BackgroundModel,
     Blob,
-    _others,
     _unrest,
-    changes,
     displacement,
-    light,
-    median_image,
-    sample_frames,
     track_blobs,
     view_distances,
     whole_views,
 )
 from vidsindy_lite.vision.rendering import Scene, render
-from vidsindy_lite.vision.video import Reel, write_video
 
 SIZE = (128, 96)
 
@@ -29,47 +23,6 @@ def texture():
     """A smooth random image, coarse pixels."""
     rng = np.random.default_rng(0)
     return cv2.GaussianBlur(rng.uniform(0, 255, (60, 80, 3)).astype(np.float32), (0, 0), 3) * 4
-
-
-def test_the_median_of_images():
-    images = np.random.default_rng(0).integers(0, 256, (21, 10, 12, 3), np.uint8)
-    before = images.copy()
-    np.testing.assert_array_equal(median_image(images), np.median(images, axis=0))
-    np.testing.assert_array_equal(images, before)
-
-
-@pytest.mark.parametrize("shift", [(0.1, 0.0), (0.0, 0.2), (0.12, -0.16)])
-def test_a_displaced_view_is_measured(texture, shift):
-    slope = np.gradient(texture, axis=(1, 0))
-    rng = np.random.default_rng(1)
-    change = -(shift[0] * slope[0] + shift[1] * slope[1])
-    changes = [(change + rng.normal(0, 0.1, change.shape)).astype(np.float32)] * 3
-    found = displacement(texture, changes, 1e3)
-    np.testing.assert_allclose(found, 4 * np.hypot(*shift), rtol=0.05)  # in pixels of the video
-    still = [rng.normal(0, 1, texture.shape).astype(np.float32) for _ in range(5)]
-    np.testing.assert_array_equal(displacement(texture, still, 1e3), 0)
-
-
-def test_a_displaced_view_is_measured_beside_what_differs_from_it(texture):
-    slope = np.gradient(texture, axis=(1, 0))
-    change = (-0.12 * slope[0] + 0.16 * slope[1]).astype(np.float32)
-    change[10:20, 30:45] += 500  # the target, before a texture whose changes are below 100
-    assert np.delete(np.abs(change), np.s_[10:20], axis=0).max() < 50
-    np.testing.assert_allclose(displacement(texture, [change], 100.0), 4 * 0.2, rtol=0.05)
-
-
-def test_what_differs_far_from_the_target_is_told():
-    change = np.zeros((60, 80, 3), np.float32)
-    change[10:20, 10:20] = 50  # the target, 100 coarse pixels
-    change[10:20, 24:26] = 50  # close by
-    assert _others([change], 8.0) == 0
-    more = change.copy()
-    more[50:52, 60:62] = 50  # far away, however small
-    assert _others([more], 8.0) == 1
-    assert _others([change, more], 8.0) == 0.5
-    assert _others([more], 100.0) == 0
-    change[:, 30:] = 50  # too large for a target
-    assert _others([change], 8.0) == 1
 
 
 def test_one_push_or_one_change_of_light_is_unrest(texture):
@@ -90,19 +43,6 @@ def test_one_push_or_one_change_of_light_is_unrest(texture):
     assert any("light changes, by up to 90 %" in doubt for doubt in unrest(lit))
 
 
-def test_light_is_measured_where_most_of_the_image_agrees():
-    then = np.full((60, 80, 3), 100, np.float32)
-    now = 0.9 * then
-    now[10:20, 10:20] = 255
-    np.testing.assert_allclose(light(now, then, np.ones((60, 80), bool)), 0.9, rtol=1e-6)
-    now[30:50] = 1.006 * then[30:50]  # what rounding does
-    know = np.zeros((60, 80), bool)
-    know[30:50] = True
-    np.testing.assert_array_equal(light(now, then, know), 1)
-    dark = np.full((60, 80, 3), 5, np.float32)
-    np.testing.assert_array_equal(light(2 * dark, dark, np.ones((60, 80), bool)), 1)
-
-
 def blob(shape=(0, 0, 0, 0), area=400.0, inside=True, sound=True):
     return Blob(np.zeros(2), area, inside, np.array(shape, float) if sound else None)
 
@@ -119,12 +59,6 @@ def test_distances_of_views_from_the_commonest_one():
     assert np.isinf(view_distances([None, None])).all()
     many = view_distances([*[blob()] * 250, blob((0, 0.3, 0, 0))])
     np.testing.assert_allclose(many, [*[0] * 250, 10])
-
-
-def test_views_beside_a_distant_one_must_be_twice_as_close():
-    distance = np.array([0.1, 0.6, 0.7, 2.0, 0.6, 0.4, 0.6, 0.9, 0.2, np.inf, 0.45])
-    expected = [True, False, False, False, False, True, True, True, True, False, True]
-    np.testing.assert_array_equal(whole_views(distance), expected)
 
 
 def learned(samples):
@@ -158,23 +92,6 @@ def test_the_model_of_a_film(variance):
     assert model.measure(frames[20], truth[20] + 30, 10) is None  # nothing there
 
 
-def test_an_outline_is_as_soft_as_its_blur_whatever_its_length():
-    truth = np.column_stack([np.linspace(20, 108, 45), 48 + 20 * np.sin(np.arange(45) / 5)])
-
-    def softness(size, blur):
-        frames = render(truth, Scene("bricks", size=size, image_size=SIZE), 1)
-        frames = np.array([cv2.GaussianBlur(f, (0, 0), blur) if blur else f for f in frames])
-        return np.median([blob.softness for blob in track_blobs(learned(frames[::2]), frames)])
-
-    sharp = softness(12, 0)
-    assert softness(24, 0) == pytest.approx(sharp, rel=0.2)
-    assert softness(24, 1.5) == pytest.approx(softness(12, 1.5), rel=0.3)
-    assert softness(24, 1.5) > 2 * sharp
-
-
-# ---------------------------------------------------------- squares on a plain ground: all is known
-
-
 GROUND, TARGET = (90, 100, 110), (20, 40, 220)
 
 
@@ -192,47 +109,22 @@ def plain():
     return learned(np.array([squares((4 + 5 * i, 4 + 3 * i, 16)) for i in range(20)]))
 
 
-def test_search_prefers_what_has_the_colour_of_the_target(plain):
-    frame = squares((20, 12, 28), colour=(160, 160, 0))  # larger, of the opposite colour
-    frame[60:76, 80:96] = TARGET
-    np.testing.assert_array_equal(plain.search(frame)[0], [87.5, 67.5])
-    faint = np.rint(0.9 * np.array(GROUND) + 0.1 * np.array(TARGET))
-    frame[12:40, 20:48] = faint  # a little of its colour on a larger area
-    np.testing.assert_array_equal(plain.search(frame)[0], [87.5, 67.5])
-
-
 @pytest.mark.parametrize(
-    ("left", "top"), [(40, 24), (33, 51), (1, 30), (30, 1), (111, 30), (30, 79)]
-)
-def test_a_square_is_measured_exactly(plain, left, top):
+    ("left", "top", "inside"),
+    [(40, 24, True), (1, 1, True), (111, 79, True),
+     (0, 30, False), (30, 0, False), (112, 30, False), (30, 80, False)],
+)  # fmt: skip
+def test_a_square_is_measured_exactly_and_at_the_border_it_may_go_on(plain, left, top, inside):
     blob = plain.measure(squares((left, top, 16)), np.array([left + 7.5, top + 7.5]), 14)
     np.testing.assert_allclose(blob.centroid, [left + 7.5, top + 7.5], atol=1e-3)
     assert blob.area == pytest.approx(16**2, rel=1e-3)
-    assert blob.inside
-
-
-@pytest.mark.parametrize(("left", "top"), [(0, 30), (30, 0), (112, 30), (30, 80), (-4, 30)])
-def test_a_square_at_the_border_of_the_image_may_go_on_beyond_it(plain, left, top):
-    blob = plain.measure(squares((left, top, 16)), np.array([left + 7.5, top + 7.5]), 14)
-    assert not blob.inside
+    assert blob.inside == inside
 
 
 @pytest.mark.parametrize(("side", "is_target"), [(6, False), (8, True), (32, True), (40, False)])
 def test_what_has_five_times_the_area_of_the_target_or_a_fifth_is_none(plain, side, is_target):
     found = plain.measure(squares((30, 30, side)), np.full(2, 30 + (side - 1) / 2), 30)
     assert (found is not None) == is_target
-
-
-def test_a_target_beside_ground_of_its_own_colour_has_no_shape():
-    frames = np.array([squares((4 + 5 * i, 4 + 3 * i, 16)) for i in range(20)])
-    frames[:, :, 56:60] = np.add(TARGET, 3)  # a stripe, on which the target cannot be told
-    model = learned(frames)
-    frame = squares((40, 40, 16))
-    frame[:, 56:60] = np.add(TARGET, 3)
-    assert model.measure(frame, np.array([47.5, 47.5]), 14).shape is None
-    frame = squares((20, 40, 16))
-    frame[:, 56:60] = np.add(TARGET, 3)
-    assert model.measure(frame, np.array([27.5, 47.5]), 14).shape is not None
 
 
 def test_a_target_of_several_colours_is_told():
@@ -247,39 +139,13 @@ def test_a_target_of_several_colours_is_told():
     assert learned(film(6)).several_colours
 
 
-@pytest.mark.parametrize("step", [0, 4])
-def test_a_camera_that_moves_now_and_then_does_not_rest(step):
-    scene = render([[np.nan, np.nan]], Scene("bricks", image_size=(140, 96)), 1)
-    scene = cv2.GaussianBlur(next(scene), (0, 0), 2)
-    samples = np.array([scene[:, step * (k == 9) :][:, :128] for k in range(21)])
-    assert BackgroundModel(samples).camera_rests == (step == 0)
-
-
-@pytest.mark.parametrize(("left", "top"), [(40, 24), (37, 51), (0, 0), (112, 80)])
+@pytest.mark.parametrize(("left", "top"), [(40, 24), (112, 80)])
 def test_a_square_that_stays_in_most_samples_is_no_background(left, top):
     stays = [squares((left, top, 16))] * 13
     leaves = [squares((76 + i, 4 + i, 16)) for i in range(0, 16, 2)]
     model = learned(np.array(stays + leaves))
     np.testing.assert_array_equal(model.background, squares())
     assert model.area == 16**2
-
-
-def test_what_moves_away_for_a_few_samples_is_background():
-    lamp = squares((40, 24, 16), colour=(250, 250, 250))
-    dark = squares((4, 60, 16))  # the target, and the lamp is off
-    model = learned(np.array([lamp] * 20 + [dark]))
-    np.testing.assert_array_equal(model.background, lamp)
-
-
-def test_samples_are_spread_from_the_first_frame_to_the_last(tmp_path):
-    for n in (50, 21, 3):
-        frames = [np.full((64, 64, 3), 4 * i, np.uint8) for i in range(n)]
-        samples = sample_frames(Reel(write_video(tmp_path / "clip.mov", frames)))
-        numbers = samples[:, 0, 0, 0] // 4
-        np.testing.assert_array_equal(numbers, np.unique(np.linspace(0, n - 1, 21).round()))
-
-
-# ---------------------------------------------------------------------------------------- following
 
 
 @pytest.mark.parametrize(("reach", "shows"), [(3, True), (7, True), (30, False)])
@@ -293,21 +159,3 @@ def test_a_part_of_a_target_that_is_in_the_background_shows(reach, shows):
     model = BackgroundModel(samples)
     model.learn_target(samples)
     assert model.shows_target() == shows
-
-
-# ---- what is asked of many pixels against the plain way
-
-
-@pytest.mark.parametrize("factor", [0.5, 1.0, 1.5])
-def test_what_is_saturated_differs_from_what_is_darker_only(factor):
-    light = np.full(3, factor, np.float32)
-    ground = np.full((1, 4, 3), 255, np.uint8)
-    grey = np.array([255.0, 200, 130, 20])
-    frame = grey.astype(np.uint8)[None, :, None].repeat(3, axis=2)
-    found = changes(frame, ground, light)[0, :, 0]
-    least = min(255 * factor, 255)  # the least that the ground may be in that light
-    np.testing.assert_allclose(found, np.minimum(grey - least, 0), atol=1e-3)
-    # What is not saturated differs from what is brighter, too, as far as a frame shows that.
-    wall = np.full((1, 4, 3), 200, np.uint8)
-    found = changes(frame, wall, light)[0, :, 0]
-    np.testing.assert_allclose(found, grey - min(200 * factor, 255), atol=1e-3)

@@ -4,12 +4,11 @@ import json
 
 import numpy as np
 import pytest
-import torch
 from tiny_onnx import BOX, write_red_detector
 
 from vidsindy_lite.vision import training
 from vidsindy_lite.vision.detector import LEAST, WEIGHTS, LearnedDetector, OnnxDetector, detections
-from vidsindy_lite.vision.network import Network, fused
+from vidsindy_lite.vision.network import Network
 from vidsindy_lite.vision.rendering import BACKGROUNDS, SHAPES, Scene, render
 
 LOG = json.loads(WEIGHTS.with_suffix(".json").read_text())
@@ -26,9 +25,6 @@ def unseen_scene(seed, **fixed):
     background = rng.choice(sorted(set(BACKGROUNDS) - set(LOG["backgrounds"])))
     shape = rng.choice(sorted(set(SHAPES) - set(LOG["shapes"])))
     return Scene.random(rng, background=str(background), shape=str(shape), **fixed)
-
-
-# ------------------------------------------------------------------------------------- predictions
 
 
 def column(u, v, size, confidence):
@@ -57,9 +53,6 @@ def test_the_surest_comes_first_and_the_unsure_not_at_all():
     assert detections(np.empty((5, 0))) == []
 
 
-# ----------------------------------------------------------------------------- the learned detector
-
-
 def test_the_weights_are_small_and_the_log_of_their_training_is_complete():
     assert WEIGHTS.stat().st_size < 2e6
     parameters = sum(p.numel() for p in Network().parameters())
@@ -74,10 +67,10 @@ def test_the_weights_are_small_and_the_log_of_their_training_is_complete():
 
 @pytest.mark.parametrize(("variance", "bound"), [(0.0, 0.5), (0.01, 0.7)])
 def test_targets_of_unseen_kinds(learned, variance, bound):
-    errors = []
+    errors, size = [], (256, 218)  # which is no multiple of anything
     for seed in range(10):
-        scene = unseen_scene(seed, noise_variance=variance, image_size=(256, 256))
-        truth = np.random.default_rng(seed).uniform(40, 215, (2, 2))
+        scene = unseen_scene(seed, noise_variance=variance, image_size=size)
+        truth = np.random.default_rng(seed).uniform(40, 178, (2, 2))
         for frame, true in zip(render(truth, scene, seed), truth, strict=True):
             found = detections(learned.predict(frame))
             errors.append(np.linalg.norm(found[0].centre - true) if found else np.inf)
@@ -85,29 +78,13 @@ def test_targets_of_unseen_kinds(learned, variance, bound):
     assert np.mean(np.array(errors) < 5) >= 0.95
 
 
-def test_sizes_that_are_no_multiple_of_anything(learned):
-    scene = unseen_scene(3, size=20, image_size=(218, 150))
-    frame = next(render([[140.3, 70.6]], scene, 0))
-    (found,) = detections(learned.predict(frame))
-    np.testing.assert_allclose(found.centre, [140.3, 70.6], atol=1.5)
-    np.testing.assert_allclose(found.size, 20, rtol=0.35)
-
-
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_nothing_is_seen_in_an_empty_scene(learned, seed):
     frame = next(render([[np.nan, np.nan]], unseen_scene(seed, image_size=(256, 256)), seed))
     assert detections(learned.predict(frame)) == []
 
 
-def test_missing_weights(tmp_path):
-    with pytest.raises(FileNotFoundError, match="weights: no such file"):
-        LearnedDetector(tmp_path / "none.pt")
-
-
-# -------------------------------------------------------------------------------------------- ONNX
-
-
-@pytest.mark.parametrize("size", [(128, 96), (256, 256), (288, 192), (512, 512)])
+@pytest.mark.parametrize("size", [(128, 96), (288, 192), (512, 512)])
 def test_an_onnx_model_sees_frames_of_any_size(tmp_path, size):
     detector = OnnxDetector(write_red_detector(tmp_path / "red.onnx", size))
     frame = np.full((192, 256, 3), 90, np.uint8)
@@ -129,27 +106,7 @@ def test_bad_onnx_files(tmp_path):
     with pytest.raises(ValueError, match=r"detector: .* fixed shape \(1, 3, height, width\)"):
         OnnxDetector(batch)
     thin = OnnxDetector(write_red_detector(tmp_path / "thin.onnx", (64, 64), rows=4))
+    with pytest.raises(FileNotFoundError, match="weights: no such file"):
+        LearnedDetector(tmp_path / "none.pt")
     with pytest.raises(ValueError, match=r"shape \(1, 4 \+ classes, anchors\), got \(1, 4, 64\)"):
         thin.predict(np.zeros((64, 64, 3), np.uint8))
-
-
-# ---- the network: its anchors, what it says untrained, and the colours that it sees
-
-
-def test_an_untrained_network_is_sure_of_nothing():
-    torch.manual_seed(0)
-    with torch.inference_mode():
-        predictions = Network().eval()(torch.rand(2, 3, 64, 96))
-    assert predictions.shape == (2, 5, 16 * 24)
-    assert predictions[:, 4].sigmoid().max() < 0.1
-    assert Network().what[-1].bias.sigmoid().item() == pytest.approx(0.01)
-
-
-def test_fused_normalisation_changes_no_value():
-    torch.manual_seed(0)
-    network, images = Network(), torch.rand(4, 3, 64, 64)
-    network(images)  # in training mode: moves the running means
-    network.eval()
-    with torch.inference_mode():
-        plain = network(images)
-        torch.testing.assert_close(fused(network)(images), plain, rtol=1e-4, atol=1e-4)

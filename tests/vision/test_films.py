@@ -46,22 +46,8 @@ def followed(folder, seed, size, truth, draw, target=None):
     return found, error
 
 
-@pytest.mark.parametrize("hinted", [False, True])
-@pytest.mark.parametrize("flicker", [0.0, 0.03])
-def test_a_ball_that_circles_within_a_few_of_its_own_widths(tmp_path, flicker, hinted):
-    truth = [160, 90] + [18, 26] * np.column_stack([np.sin(ANGLE), np.sin(2.3 * ANGLE + 1)])
-
-    def draw(image, i):
-        disc(image, truth[i], 9, (30, 30, 220))
-        return (1 + flicker * np.sin(2 * i)) * image
-
-    hint = around(truth, 22) if hinted else None
-    _, error = followed(tmp_path, 0, (320, 180), truth, draw, hint)
-    assert np.nanpercentile(error, 95) < 1
-
-
-@pytest.mark.parametrize(("radius", "hinted"), [(30, False), (45, False), (45, True)])
-def test_a_large_ball_that_never_leaves_its_own_ground(tmp_path, radius, hinted):
+def test_a_large_ball_that_never_leaves_its_own_ground(tmp_path):
+    radius = 45
     leaves = 0.45 * radius * np.column_stack([np.sin(ANGLE), np.sin(2.3 * ANGLE + 1)])
     truth = [160, 90] + leaves
 
@@ -69,7 +55,7 @@ def test_a_large_ball_that_never_leaves_its_own_ground(tmp_path, radius, hinted)
         disc(image, truth[i], radius, (210, 60, 30))
         return image
 
-    hint = around(truth, 2 * radius + 4) if hinted else None
+    hint = around(truth, 2 * radius + 4)
     found, error = followed(tmp_path, 2, (320, 180), truth, draw, hint)
     assert np.nanpercentile(error, 95) < 1
     assert not found.warnings
@@ -78,23 +64,7 @@ def test_a_large_ball_that_never_leaves_its_own_ground(tmp_path, radius, hinted)
 ROUND = [120, 100] + 70 * np.column_stack([np.cos(ANGLE), -np.sin(ANGLE)])
 
 
-@pytest.mark.parametrize("hinted", [False, True])
-def test_a_mark_on_a_wheel_whose_tyre_differs_from_the_ground_all_the_time(tmp_path, hinted):
-    grey = np.random.default_rng(1).uniform(30, 150, 60)
-
-    def draw(image, i):
-        for k, level in enumerate(grey):
-            start = -np.degrees(ANGLE[i]) + 6 * k
-            cv2.ellipse(image, (120, 100), (70, 70), 0, start, start + 6, (level,) * 3, 14)
-        disc(image, ROUND[i], 7, (110, 230, 40))
-        return image
-
-    hint = around(ROUND, 17) if hinted else None
-    _, error = followed(tmp_path, 1, (240, 200), ROUND, draw, hint)
-    assert np.nanpercentile(error, 95) < 1.5
-
-
-@pytest.mark.parametrize("mixed", [0.0, 0.5, 0.7])
+@pytest.mark.parametrize("mixed", [0.0, 0.7])
 def test_a_colour_that_the_film_shows_mixed_with_its_ground_is_not_lost(tmp_path, mixed):
     def draw(image, i):
         drawn = image.copy()
@@ -105,25 +75,6 @@ def test_a_colour_that_the_film_shows_mixed_with_its_ground_is_not_lost(tmp_path
     found, error = followed(tmp_path, 3, (240, 200), ROUND, draw, hint)
     assert np.nanpercentile(error, 95) < 1.5
     assert any("has the colour" in doubt for doubt in found.warnings) == (mixed > 0.4)
-
-
-def test_what_is_in_a_box_is_followed_though_something_plainer_moves(tmp_path):
-    truth = np.column_stack([30 + 2.0 * np.arange(N), 150 + 10 * np.sin(ANGLE)])
-    plainer = [120, 60] + [90, 30] * np.column_stack([np.cos(ANGLE), np.sin(ANGLE)])
-
-    def draw(image, i):
-        disc(image, plainer[i], 10, (20, 20, 230))
-        disc(image, truth[i], 6, (60, 60, 60))
-        return image
-
-    found, error = followed(tmp_path, 4, (240, 200), truth, draw, around(truth, 15))
-    assert np.nanpercentile(error, 95) < 2
-    assert not any("is not seen in that frame" in doubt for doubt in found.warnings)
-    assert np.isfinite(error[10])
-    np.testing.assert_array_equal(np.asarray(found), found.pixels)
-
-
-# ---- what happens to a film while it runs: the light, a push, something larger; none goes unsaid
 
 
 SIZE = 200, 150
@@ -158,12 +109,10 @@ def error_of(found, truth):
 @pytest.mark.parametrize(
     "light",
     [
-        lambda i: 1.0 if i < 30 else 0.8,
         lambda i: 0.8 + 0.15 * np.sin(1.7 * i),
-        lambda i: 1 - 0.4 * i / LENGTH,
         lambda i: 1.0 if i < 54 else 0.7,
     ],
-    ids=["step", "flicker", "ramp", "late"],
+    ids=["flicker", "late"],
 )
 def test_changing_light_loses_no_frames(tmp_path, light):
     path = film(tmp_path / "clip.mov", lambda image, i: light(i) * image)
@@ -174,8 +123,7 @@ def test_changing_light_loses_no_frames(tmp_path, light):
     assert any("the light changes" in doubt for doubt in track(path, "background").warnings)
 
 
-@pytest.mark.parametrize("when", [4, 30, 55])
-@pytest.mark.parametrize("hinted", [False, True])
+@pytest.mark.parametrize(("when", "hinted"), [(4, False), (55, True)])
 def test_one_push_of_the_camera_is_taken_out(tmp_path, when, hinted):
     move = np.float32([[1, 0, 5], [0, 1, 3]])
 
@@ -191,10 +139,9 @@ def test_one_push_of_the_camera_is_taken_out(tmp_path, when, hinted):
     assert np.nanmax(error) < 0.5
 
 
-@pytest.mark.parametrize("radius", [6, 12, 20])
-def test_something_else_that_moves_is_not_followed_unsaid(tmp_path, radius):
+def test_something_else_that_moves_is_not_followed_unsaid(tmp_path):
     def passed(image, i):
-        disc(image, (20 + 2.6 * i, 120), radius, (60, 60, 60))
+        disc(image, (20 + 2.6 * i, 120), 12, (60, 60, 60))
         return image
 
     found = track(film(tmp_path / "clip.mov", passed))
@@ -209,9 +156,6 @@ def test_a_target_that_is_lost_in_many_frames_is_told(tmp_path):
     found = track(film(tmp_path / "clip.mov", lambda image, i: image, truth))
     assert np.isnan(found.pixels[32:43]).all()
     assert any("is lost in 34 of 60 frames" in doubt for doubt in found.warnings)
-
-
-# ---- where a target is in frames that show only a part of it
 
 
 FLIGHT = 60
@@ -242,13 +186,9 @@ def flight(path, post, wall):
 @pytest.mark.parametrize(("post", "wall"), [(14, False), (0, True)], ids=["post", "wall"])
 def test_what_is_seen_in_part_is_where_its_motion_leads(tmp_path, post, wall):
     path = flight(tmp_path / "clip.mov", post, wall)
-    error, hinted = (
-        np.linalg.norm(track(path, target=hint).pixels - TRUTH, axis=1) for hint in (None, HINT)
-    )
-    for found in (error, hinted):
-        assert np.isfinite(found).mean() >= 0.95
-        assert np.nanmax(found) < 1
-    assert np.isfinite(hinted[np.isfinite(error)]).all()
+    error = np.linalg.norm(track(path, target=HINT if wall else None).pixels - TRUTH, axis=1)
+    assert np.isfinite(error).mean() >= 0.95
+    assert np.nanmax(error) < 1
 
 
 def test_what_is_hidden_altogether_stays_a_gap(tmp_path):
@@ -260,28 +200,13 @@ def test_what_is_hidden_altogether_stays_a_gap(tmp_path):
     assert np.nanmax(error) < 3
 
 
-# ---- targets of several colours: the middle of the whole, however it turns
-
-
-HALVES = {
-    "red and white": ((30, 30, 210), (240, 240, 240)),
-    "black and white": ((20, 20, 25), (235, 235, 235)),
-    "one is faint": ((250, 250, 20), (40, 50, 200)),
-}
-
-
-def around_bricks():
-    s = 2 * np.pi * np.arange(LENGTH) / LENGTH
-    return np.column_stack([100 + 60 * np.sin(2 * s), 75 + 40 * np.sin(3 * s + 1)])
-
-
 def beach_ball(path, radius, rate, colours, flicker):
     """A ball of two halves that turns by `rate` radians a frame, before bricks."""
     rng = np.random.default_rng(1)
     ground = cv2.GaussianBlur(BACKGROUNDS["bricks"](rng, SIZE), (0, 0), 1)
 
     def frames():
-        for i, place in enumerate(around_bricks()):
+        for i, place in enumerate(places()):
             image = ground.copy()
             at, turn = np.rint(16 * place).astype(int).tolist(), np.rad2deg(rate * i)
             for colour, first in zip(colours, (0, 180), strict=True):
@@ -296,10 +221,15 @@ def beach_ball(path, radius, rate, colours, flicker):
     return write_video(path, frames())
 
 
-@pytest.mark.parametrize(("rate", "flicker"), [(0.04, 0.05), (0.3, 0.0)])
-@pytest.mark.parametrize("colours", HALVES)
+@pytest.mark.parametrize(
+    ("colours", "rate", "flicker"),
+    [
+        (((30, 30, 210), (240, 240, 240)), 0.04, 0.05),
+        (((250, 250, 20), (40, 50, 200)), 0.3, 0.0),  # one is faint
+    ],
+)
 def test_a_ball_of_two_halves_that_turns(tmp_path, colours, rate, flicker):
-    path = beach_ball(tmp_path / "clip.mov", 12, rate, HALVES[colours], flicker)
-    error = np.linalg.norm(track(path).pixels - around_bricks(), axis=1)
+    path = beach_ball(tmp_path / "clip.mov", 12, rate, colours, flicker)
+    error = np.linalg.norm(track(path).pixels - places(), axis=1)
     assert np.isfinite(error).mean() > 0.8
     assert np.nanpercentile(error, 90) < 1

@@ -76,14 +76,6 @@ def test_a_box_in_a_reduced_film_is_where_its_pixels_are_reduced_to():
     assert Hint(colour=(1, 2, 3)).boxed((200, 120), 5, 2) is None
 
 
-def test_a_colour_that_was_told_is_held_against_what_is_followed():
-    hint = Hint(colour=(200, 30, 20))
-    assert hint.unlike(np.array([170.0, 40, 30])) == ()  # in less light
-    (doubt,) = hint.unlike(np.array([30.0, 120, 200]))
-    assert doubt == "what is followed has the colour (30, 120, 200), not (200, 30, 20) as told"
-    assert Hint(0, (36, 46, 9, 9)).unlike(np.array([30.0, 120, 200])) == ()
-
-
 def test_a_colour_that_its_ground_is_mixed_with_is_like_it():
     hint, ground = Hint(colour=(40, 230, 110)), np.array([[120.0, 120, 120]])
     told = np.array([[40.0, 230, 110]])

@@ -9,10 +9,9 @@ from footage import Phone, camera_maps, write_phone
 from helpers import real
 
 from vidsindy_lite import Hint, track, write_video
-from vidsindy_lite.vision import moving
 from vidsindy_lite.vision.candidates import Candidates
-from vidsindy_lite.vision.moving import Film, expected, finished
-from vidsindy_lite.vision.refining import View, fitting, joined, scatter
+from vidsindy_lite.vision.moving import expected, finished
+from vidsindy_lite.vision.refining import View, fitting, joined
 from vidsindy_lite.vision.steadying import (
     CameraMotion,
     at_rest,
@@ -20,7 +19,6 @@ from vidsindy_lite.vision.steadying import (
     stands_still,
     steadied,
 )
-from vidsindy_lite.vision.video import Reel
 
 SMALL = {"image_size": (320, 240), "frames": 60}
 
@@ -30,20 +28,13 @@ def errors(path, truth, target=None):
     return found, np.linalg.norm(found.pixels - truth, axis=1)
 
 
-# --------------------------------------------------------------------------------- phone footage
-
-
 @pytest.mark.parametrize(
     "phone",
     [
         Phone("bricks", 14, shadow=True, **SMALL),
-        Phone("wood", 20, flicker=0.1, colour=(250, 225, 15), **SMALL),
-        Phone("bricks", 18, camera="trembling", **SMALL),
         Phone("wood", 16, camera="held", flicker=0.03, colour=(240, 240, 235), **SMALL),
-        Phone("plain", 20, colour=(116, 118, 115), noise=1, **SMALL),
-        Phone("hills", 60, nearness=1.2, bitrate=1_500_000, **SMALL),
     ],
-    ids=["shadow", "flicker", "trembling", "held", "grey", "large"],
+    ids=["shadow", "held"],
 )
 def test_phone_footage(tmp_path, phone):
     truth, _ = write_phone(tmp_path / "clip.mp4", phone, 1)
@@ -59,30 +50,6 @@ def test_a_large_target_is_plainer_than_leaves_that_sway(tmp_path):
     found, error = errors(tmp_path / "clip.mp4", truth)
     assert np.nanpercentile(error, 95) < 1.5
     assert not found.warnings
-
-
-def test_a_small_dark_ball_is_not_lost_to_somebody_in_dark_clothes(tmp_path):
-    # Blurred, it is of their colour, and it passes before them.
-    phone = Phone("sky", 8, colour=(20, 18, 22), noise=4, exposure=0.9, person=True, **SMALL)
-    truth, _ = write_phone(tmp_path / "clip.mp4", phone, 4)
-    found, error = errors(tmp_path / "clip.mp4", truth)
-    assert np.isfinite(error).mean() >= 0.95
-    assert np.nanpercentile(error, 95) < 1.5
-
-
-@pytest.mark.slow
-@pytest.mark.thorough
-def test_twenty_films(tmp_path):
-    medians, wrong = [], []
-    for seed in range(20):
-        phone = Phone.random(np.random.default_rng(seed))
-        truth, _ = write_phone(tmp_path / "clip.mp4", phone, seed)
-        found, error = errors(tmp_path / "clip.mp4", truth)
-        medians.append(np.nanmedian(error))
-        if np.nanpercentile(error, 90) > phone.size and not found.warnings:
-            wrong.append(seed)
-    assert not wrong
-    assert np.median(medians) < 0.3
 
 
 def test_where_two_things_move_alike_it_says_so_and_a_hint_decides(tmp_path):
@@ -111,12 +78,8 @@ def test_where_two_things_move_alike_it_says_so_and_a_hint_decides(tmp_path):
         assert not any("something else moves" in warning for warning in found.warnings)
 
 
-# --------------------------------------------------------------------------------------- its parts
-
-
-@pytest.mark.parametrize("camera", ["trembling", "held"])
-def test_the_camera_is_followed(camera):
-    phone = Phone(camera=camera, **SMALL)
+def test_the_camera_is_followed():
+    phone = Phone(camera="held", **SMALL)
     rng = np.random.default_rng(3)
     maps = camera_maps(phone, rng)[4::8]
     scene = cv2.GaussianBlur(rng.uniform(0, 255, (340, 420, 3)).astype(np.float32), (0, 0), 2)
@@ -174,32 +137,6 @@ def test_a_target_is_expected_where_the_camera_sees_it_in_whole_frames():
     np.testing.assert_allclose(whole.box[near], 3 * plain.box[near])
 
 
-def test_a_film_knows_which_of_its_frames_are_its_samples(tmp_path, monkeypatch):
-    ground = np.full((48, 64, 3), 100, np.uint8)
-    frames = Reel(write_video(tmp_path / "clip.mov", [ground] * 41))
-    samples = np.array([ground] * 21)
-    film = Film.of(frames, samples, rests=True)
-    np.testing.assert_array_equal(film.sampled, np.arange(0, 41, 2))
-    # Where fewer frames can be read than the file tells, the last one stands for the others.
-    monkeypatch.setattr(moving, "camera_motion", lambda *_: (at_rest(36), True))
-    film = Film.of(frames, samples)
-    np.testing.assert_array_equal(film.sampled, np.minimum(np.arange(0, 41, 2), 35))
-
-
-@pytest.mark.parametrize("end", [np.s_[:2], np.s_[-2:]])
-def test_the_first_and_last_views_are_held_against_those_beside_them(end):
-    frames, inside = np.arange(40), np.full(40, True)
-    places = np.column_stack([3.0 * frames, 50 + 20 * np.sin(frames / 6)])
-    areas = np.full(40, 100.0)
-    areas[end] = 190
-    good = fitting(frames, places, areas, inside)
-    np.testing.assert_array_equal(np.flatnonzero(~good), frames[end])
-    last = frames[end][[0] if end.start is None else [-1]]
-    places[last] += [0, 9]
-    good = fitting(frames, places, np.full(40, 100.0), inside)
-    np.testing.assert_array_equal(np.flatnonzero(~good), last)
-
-
 def test_what_touches_other_things_must_be_where_the_motion_leads():
     frames, areas, inside = np.arange(40), np.full(40, 900.0), np.full(40, True)
     places = np.column_stack([3.0 * frames, 50 + 20 * np.sin(frames / 6)])
@@ -221,15 +158,6 @@ def test_what_touches_other_things_at_an_end_is_held_against_views_of_the_target
     frames[3:] += 4
     places[3:] += [12, 0]
     good = fitting(frames, places, areas, inside, alone)
-    np.testing.assert_array_equal(good, alone)
-
-
-def test_what_touches_other_things_and_has_no_views_beside_it_is_left_out():
-    frames, inside, alone = np.arange(40), np.full(40, True), np.arange(40) > 0
-    frames[1:] += 16
-    places = np.column_stack([3.0 * frames, 50 + 20 * np.sin(frames / 6)])
-    assert fitting(frames, places, np.full(40, 900.0), inside).all()
-    good = fitting(frames, places, np.full(40, 900.0), inside, alone)
     np.testing.assert_array_equal(good, alone)
 
 
@@ -270,6 +198,8 @@ def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
     larger = along(20, np.where(np.arange(20) < 12, 100.0, 300.0))
     (doubt,) = finished(larger, CameraMotion(maps, errors), ()).warnings
     assert doubt.startswith("from frame 12 on, what is followed has another size at once")
+    few = finished(along(9) + [None] * 191, at_rest(200), ())
+    assert np.isnan(few.pixels).all()  # of a twentieth of the frames it makes none
     errors[16:] = np.inf
     found = finished(views, CameraMotion(maps, errors), ())
     assert np.isfinite(found.pixels[:, 0]).sum() == 16
@@ -286,19 +216,6 @@ def test_an_outline_that_changes_from_frame_to_frame_is_told(part, told):
     assert (np.median(found.confidence) < np.exp(-2 / 3)) == told
 
 
-@pytest.mark.parametrize("faint", [8, 20])
-def test_views_before_ground_of_the_targets_colour_are_left_out_unless_all_are(faint):
-    views = along(20, faint=True)[:faint] + along(20)[faint:]
-    seen = np.isfinite(finished(views, at_rest(20), ()).pixels[:, 0])
-    np.testing.assert_array_equal(seen, (np.arange(20) >= faint) | (faint == 20))
-
-
-@pytest.mark.parametrize(("seen", "found"), [(9, False), (11, True)])
-def test_a_target_is_seen_in_a_twentieth_of_the_frames_at_least(seen, found):
-    followed = finished(along(seen) + [None] * (200 - seen), at_rest(200), ())
-    assert np.isfinite(followed.pixels[:, 0]).sum() == found * seen
-
-
 def dashing(frames, turn, width):
     """Round in `turn` frames, by up to 37 pixels a frame in a few of them."""
     angle = 2 * np.pi * frames / turn
@@ -306,26 +223,18 @@ def dashing(frames, turn, width):
     return np.column_stack([160 + 100 * np.cos(angle), 200 - up])
 
 
-@pytest.mark.parametrize(("turn", "width"), [(50, 0.25), (60, 0.25)])
-def test_of_a_fast_target_no_view_is_left_out_but_one_that_is_displaced(turn, width):
+def test_of_a_fast_target_no_view_is_left_out_but_one_that_is_displaced():
+    turn, width = 60, 0.25
     frames, areas, inside = np.arange(2 * turn), np.full(2 * turn, 150.0), np.full(2 * turn, True)
     places = dashing(frames, turn, width)
     assert fitting(frames, places, areas, inside).all()
-    for displaced in range(turn - 12, turn + 13):
+    kept = np.delete(frames, np.s_[55:58])  # beside a gap
+    assert fitting(kept, places[kept], areas[kept], inside[kept]).all()
+    for displaced in range(turn - 12, turn + 13, 4):
         seen = places.copy()
         seen[displaced] += [20, 15]
         good = fitting(frames, seen, areas, inside)
         np.testing.assert_array_equal(np.flatnonzero(~good), [displaced])
-
-
-def test_of_a_fast_target_no_view_is_left_out_beside_a_gap():
-    for gap in range(40, 80):
-        frames = np.delete(np.arange(120), np.s_[gap : gap + 3])
-        places = dashing(frames, 60, 0.25)
-        assert fitting(frames, places, np.full(117, 150.0), np.full(117, True)).all()
-
-
-# --------------------------------------------------------------------------------------- real clips
 
 
 def test_the_toss():
@@ -336,26 +245,7 @@ def test_the_toss():
     assert (error[shown] < 1).mean() >= 0.9
 
 
-@pytest.mark.slow
-def test_the_can():
-    path = real("can_1")
-    truth = np.genfromtxt(path.with_suffix(".csv"), delimiter=",", skip_header=1)[:, 1:]
-    off = (track(path).in_frames - truth)[67:]  # before, the reference has lost the can
-    error = np.linalg.norm(off - np.nanmedian(off, axis=0), axis=1)
-    assert (error < 6).mean() >= 0.95
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "first"), [("diabolo", 15), ("pendulum", 17)])
-def test_clips_without_reference_have_smooth_tracks(name, first):
-    found = track(real(name))
-    at = np.flatnonzero(np.isfinite(found.pixels[:, 0]))
-    # Before its turning points the pendulum is lost, on some processors for a dozen frames more.
-    assert (at >= first).sum() >= 0.7 * (len(found.pixels) - first)
-    assert scatter(at, found.pixels[at]) < 2
-
-
-def lit_unevenly(radius, frames=80, seed=3):
+def lit_unevenly(radius, frames=60, seed=3):
     """A red ball of some pixels that circles before texture, in light that flickers."""
     rng = np.random.default_rng(seed)
     ground = sum(
@@ -372,19 +262,13 @@ def lit_unevenly(radius, frames=80, seed=3):
         yield place, np.clip(image + rng.normal(0, 2, image.shape), 0, 255).astype(np.uint8)
 
 
-@pytest.mark.parametrize("half", [5, 8])
-def test_a_small_target_is_followed_from_a_box_that_is_drawn_loosely(tmp_path, half):
+def test_a_small_target_is_followed_from_a_box_that_is_drawn_loosely(tmp_path):
     truth, images = map(np.array, zip(*lit_unevenly(3), strict=True))
     path = write_video(tmp_path / "clip.mov", iter(images))
-    box = (*(truth[10] - half), 2 * half, 2 * half)
+    box = (*(truth[10] - 8), 16, 16)
     found, error = errors(path, truth, Hint(frame=10, box=box))
     assert np.nanmax(error) < 1.5
     assert np.isfinite(error).mean() > 0.9
     assert found.warnings == ()
-
-
-def test_a_box_in_which_nothing_moves_is_followed_by_its_looks_and_told(tmp_path):
-    truth, images = map(np.array, zip(*lit_unevenly(8), strict=True))
-    path = write_video(tmp_path / "clip.mov", iter(images))
-    found = track(path, target=Hint(frame=10, box=(230, 110, 20, 20)))
-    assert "looks alone" in " ".join(found.warnings)
+    still = track(path, target=Hint(frame=10, box=(230, 110, 20, 20)))
+    assert "looks alone" in " ".join(still.warnings)

@@ -1,7 +1,5 @@
 """The ground: what frames show together, what a target hides, how exactly it is known."""
 
-import tracemalloc
-
 import cv2
 import numpy as np
 import pytest
@@ -13,33 +11,6 @@ from vidsindy_lite.vision.plate import (
     noise_of,
     tolerance,
 )
-
-WIDTH, HEIGHT, FRAMES = 160, 120, 12
-RNG = np.random.default_rng(0)
-SCENE = RNG.integers(90, 110, (HEIGHT + 40, WIDTH + 40, 1)).astype(np.uint8).repeat(3, axis=2)
-
-
-def test_a_plate_makes_no_copies_of_its_samples():
-    samples = np.random.default_rng(0).integers(0, 256, (21, 3000, 40, 3), np.uint8)
-    maps = np.array([[[1, 0, k % 3], [0, 1, k % 2], [0, 0, 1.0]] for k in range(21)])
-    tracemalloc.start()
-    Plate(samples, maps, np.ones(21, bool))
-    _, most = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert most < samples.nbytes / 2
-
-
-@pytest.mark.parametrize("moves", [False, True])
-def test_every_third_pixel_of_a_plate_is_that_of_the_whole(moves):
-    frames = np.array([SCENE[:HEIGHT, moves * k :][:, :WIDTH] for k in range(FRAMES)])
-    maps = np.array([[[1, 0, moves * k], [0, 1, 0], [0, 0, 1.0]] for k in range(FRAMES)])
-    plate = Plate(frames, maps, np.ones(FRAMES, bool))
-    whole, thin = (
-        plate.seen_from(maps[4], np.array([5, 2]), np.array([75, 52]), step) for step in (1, 3)
-    )
-    assert thin[0].shape == (17, 24, 3)
-    for one, other in zip(whole, thin, strict=True):
-        np.testing.assert_array_equal(one[::3, ::3], other)
 
 
 def panned(u, v, size=(48, 36)):
@@ -59,22 +30,6 @@ def test_a_plate_of_a_camera_that_turns_far_shows_what_is_around_the_middle_of_i
     middle = 10 * np.array(pan) + [23.5, 17.5]
     found = (np.array(size) - 1) / 2 - plate.shift[:2, 2]
     np.testing.assert_allclose(found, middle, atol=1)
-
-
-def test_the_plate_of_a_moving_camera():
-    rng = np.random.default_rng(0)
-    scene = cv2.GaussianBlur(rng.uniform(0, 255, (200, 300, 3)).astype(np.float32), (0, 0), 3)
-    scene = np.clip(128 + 5 * (scene - 128), 0, 255).astype(np.uint8)
-    maps = np.array([[[1, 0, 4.0 * k], [0, 1, 0], [0, 0, 1]] for k in range(9)])
-    samples = np.array([scene[20:120, 20 + 4 * k : 140 + 4 * k] for k in range(9)])
-    samples[4, 40:60, 40:60] = 0  # the target, once
-    plate = Plate(samples, maps, np.ones(9, bool))
-    for sample, here in zip(samples[[0, 4, 8]], maps[[0, 4, 8]], strict=True):
-        view, known = plate.seen_from(here)
-        difference = np.abs(view.astype(int) - sample)[known]
-        assert known.mean() > 0.8
-        assert np.median(difference) == 0
-    assert plate.seen_from(maps[4], np.array([40, 40]), np.array([60, 60]))[0].min() > 0
 
 
 @pytest.mark.parametrize("pan", [0, 2])
@@ -122,8 +77,9 @@ def test_a_plate_is_of_one_light_though_the_exposure_changes(pan):
         assert noise_of(samples, maps, plain) > 2 * noise_of(samples, maps, even)
 
 
-@pytest.mark.parametrize(("noise", "least"), [(0.5, 8), (3, 15), (30, 60)])
-@pytest.mark.parametrize(("pan", "edge"), [(0, 0.12), (1, 0.5)])
+@pytest.mark.parametrize(
+    ("noise", "least", "pan", "edge"), [(0.5, 8, 0, 0.12), (3, 15, 1, 0.5), (30, 60, 1, 0.5)]
+)
 def test_the_tolerance_is_five_times_the_noise_and_what_a_displaced_edge_does(
     noise, least, pan, edge
 ):
@@ -142,8 +98,8 @@ def test_the_tolerance_is_five_times_the_noise_and_what_a_displaced_edge_does(
     assert (~known).any() == (pan > 0)
 
 
-@pytest.mark.parametrize("light", [1.0, 0.8])
-def test_the_noise_of_a_film_is_that_of_its_samples(light):
+def test_the_noise_of_a_film_is_that_of_its_samples():
+    light = 0.8
     rng = np.random.default_rng(0)
     ground = rng.uniform(80, 200, (90, 120, 3))
     samples = light ** (np.arange(21) % 2)[:, None, None, None] * ground

@@ -3,43 +3,16 @@
 import cv2
 import numpy as np
 import pytest
-from footage import Phone, write_phone
 
-from vidsindy_lite import track
 from vidsindy_lite.vision.candidates import Plate
 from vidsindy_lite.vision.refining import (
-    _BESIDE,
     Lens,
     View,
     entire,
     fitting,
     hidden,
-    joined,
     scatter,
-    swapped,
 )
-
-
-@pytest.mark.parametrize("missing", [0, 1])
-def test_two_that_meet_and_part_are_one_in_between_if_both_sides_are_seen(missing):
-    before, during, after = [100.0] * _BESIDE, [220.0] * 6, [100.0] * (_BESIDE - missing)
-    expected = [False] * _BESIDE + [not missing] * 6 + [False] * len(after)
-    assert joined(np.array(before + during + after)).tolist() == expected
-    assert joined(np.array(after + during + before)).tolist() == expected[::-1]
-
-
-@pytest.mark.parametrize("factor", [3.0, 1 / 3])
-def test_what_is_larger_or_smaller_at_once_and_remains_so_is_something_else(factor):
-    areas = np.linspace(100, 150, 40)
-    frames = np.arange(40)
-    assert swapped(frames, areas) is None
-    areas[20:] *= factor
-    assert swapped(frames, areas) == 20
-    assert swapped(np.where(frames < 20, frames, frames + 20), areas) is None  # nobody looked
-    assert swapped(np.where(frames < 20, frames, frames + 6), areas) == 20
-    areas[22:] /= factor
-    assert swapped(frames, areas) is None
-
 
 GROUND = np.full((60, 80, 3), (60, 90, 120), np.uint8)
 
@@ -61,9 +34,8 @@ def disc(centre, radius, size=(80, 60)):
     return inside.reshape(size[1], 10, size[0], 10).mean(axis=(1, 3))[..., None]
 
 
-@pytest.mark.parametrize("radius", [5.0, 9.0])
-@pytest.mark.parametrize("centre", [(40.3, 30.6), (31.0, 22.25)])
-def test_the_centroid_and_area_of_a_disc_are_those_of_its_parts_of_pixels(centre, radius):
+@pytest.mark.parametrize(("radius", "centre"), [(5.0, (40.3, 30.6)), (9.0, (31.0, 22.25))])
+def test_the_centroid_and_area_of_a_disc_are_those_of_its_parts_of_pixels(radius, centre):
     ground = np.full((60, 80, 3), 90, np.uint8)
     share, colour = disc(centre, radius), np.array([30, 60, 220])
     frame = np.rint((1 - share) * ground + share * colour).astype(np.uint8)
@@ -74,15 +46,6 @@ def test_the_centroid_and_area_of_a_disc_are_those_of_its_parts_of_pixels(centre
     np.testing.assert_allclose(view.centroid, centre, atol=0.02)
     np.testing.assert_allclose(view.colour, colour, atol=1)
     assert look(ground, box, colour, centre, ground) is None
-
-
-@pytest.mark.parametrize(("shade", "faint"), [(90, False), (176, False), (192, True)])
-def test_a_view_before_ground_of_about_its_own_colour_is_faint(shade, faint):
-    ground = np.full((60, 80, 3), 90, np.uint8)
-    ground[:, 10:70] = shade
-    share = disc((40.0, 30.0), 8)
-    frame = np.rint((1 - share) * ground + share * 200).astype(np.uint8)
-    assert look(frame, (32, 22, 16, 16), [200] * 3, (40, 30), ground).faint == faint
 
 
 @pytest.mark.parametrize("colour", [(75, 130, 110), (70, 98, 122)])
@@ -107,21 +70,16 @@ RED, GREEN = (30, 50, 230), (60, 220, 90)
 
 
 def test_of_two_things_of_the_targets_colour_the_nearer_one_is_seen():
-    frame = painted(((30, 20, 9, 9), RED), ((50, 30, 9, 9), RED))
+    boxes = (30, 20, 9, 9), (50, 30, 9, 9)
+    frame = painted(*((box, RED) for box in boxes))
     for centre in ((34.0, 24.0), (54.0, 34.0)):
         view = look(frame, (36, 18, 18, 26), RED, centre)
         np.testing.assert_allclose(view.centroid, centre, atol=0.05)
-
-
-def test_of_two_things_of_another_colour_the_nearer_one_is_the_whole():
-    # Neither has the target's colour: the view has no area, its whole has one of them.
-    frame = painted(((30, 20, 11, 11), GREEN), ((50, 30, 11, 11), GREEN))
-    for centre in ((35.0, 25.0), (55.0, 35.0)):
-        view = look(frame, (36, 18, 18, 26), RED, centre)
+        # Of the target's colour is neither of two others: the nearer one is the whole.
+        view = look(painted(*((box, GREEN) for box in boxes)), (36, 18, 18, 26), RED, centre)
         assert view.area == 0
         np.testing.assert_allclose(view.whole.centroid, centre, atol=0.05)
-        assert view.whole.area == pytest.approx(121, rel=0.02)
-        np.testing.assert_allclose(view.whole.colour, GREEN, atol=1)
+        assert view.whole.area == pytest.approx(81, rel=0.02)
 
 
 def test_the_whole_of_a_thing_of_two_colours_has_the_area_and_centroid_of_both():
@@ -154,16 +112,10 @@ def test_what_differs_from_the_ground_the_other_way_round_is_another_colour():
         assert view.whole.area == pytest.approx(both, rel=0.05)
 
 
-def test_the_outline_of_a_view_is_that_of_its_pixels_in_the_frame():
-    view = look(painted(((31, 22, 12, 8), RED)), (31, 22, 12, 8), RED)
-    corners = {tuple(map(int, corner)) for corner in view.outline}
-    assert corners == {(31, 22), (42, 22), (42, 29), (31, 29)}
-
-
 @pytest.mark.parametrize(
     ("corner", "inside"),
-    [((3, 20), True), ((0, 20), False), ((30, 0), False), ((30, 3), True),
-     ((65, 20), True), ((68, 20), False), ((30, 45), True), ((30, 48), False)],
+    [((3, 3), True), ((0, 20), False), ((30, 0), False),
+     ((65, 45), True), ((68, 20), False), ((30, 48), False)],
 )  # fmt: skip
 def test_what_reaches_the_border_of_the_image_is_not_inside(corner, inside):
     box = (*corner, 12, 12)
@@ -193,30 +145,6 @@ def test_a_view_may_be_off_its_way_by_a_part_of_its_size(side):
         places[15, 1] += off
         assert fitting(FRAMES, places, areas, ALL)[15] == fits
         assert fitting(FRAMES, places, areas, ALL).sum() == 29 + fits
-
-
-def test_views_of_a_target_alone_say_where_it_is_if_they_are_most():
-    # The last ten views, where it is not alone, are wrong by the same.
-    alone = FRAMES < 20
-    places, areas = WAY.copy(), np.full(30, 100.0)
-    areas[~alone] = 200
-    np.testing.assert_array_equal(fitting(FRAMES, places, areas, ALL, alone), alone)
-    # Of so few alone nothing is made: the others fit each other.
-    few = FRAMES < 12
-    areas = np.where(few, 200.0, 100.0)
-    np.testing.assert_array_equal(
-        fitting(FRAMES, places, areas, ALL, few), fitting(FRAMES, places, areas, ALL)
-    )
-
-
-@pytest.mark.parametrize(("speed", "fits"), [(2.0, True), (9.0, False)])
-def test_what_is_not_alone_may_be_less_exact_where_the_target_bounces(speed, fits):
-    # Six tenths of the speed off what a quartic says, a quarter of it between the two.
-    places = np.column_stack([3 * FRAMES, 80 - speed * np.abs(FRAMES - 15)])
-    alone = FRAMES != 15
-    found = fitting(FRAMES, places, np.full(30, 900.0), ALL, alone)
-    assert found[alone].all()
-    assert found[15] == fits
 
 
 def test_the_scatter_is_that_of_the_noise_whatever_cubic_the_motion_is():
@@ -249,24 +177,12 @@ def test_what_turns_about_a_whole_that_keeps_its_size_is_a_part_of_it():
     around = 4 * np.column_stack([np.cos(angle), np.sin(angle)])
     shown = parts_of_wholes(around, np.full(40, 220.0))
     assert entire(shown) == ([one.whole for one in shown], ())
-
-
-def test_what_stays_on_one_side_is_not_its_part():
-    shown = parts_of_wholes(np.tile([4.0, 2.0], (40, 1)), np.full(40, 220.0))
-    assert entire(shown) == (shown, ())
-
-
-def test_a_whole_that_changes_its_size_is_doubted():
-    rng = np.random.default_rng(0)
-    angle = np.linspace(0, 9, 40)
-    around = 4 * np.column_stack([np.cos(angle), np.sin(angle)])
-    shown = parts_of_wholes(around, 220 * np.exp(rng.normal(0, 1, 40)))
-    kept, doubts = entire(shown)
+    aside = parts_of_wholes(np.tile([4.0, 2.0], (40, 1)), np.full(40, 220.0))
+    assert entire(aside) == (aside, ())
+    changing = 220 * np.exp(np.random.default_rng(0).normal(0, 1, 40))
+    kept, doubts = entire(shown := parts_of_wholes(around, changing))
     assert kept == shown
     assert "several colours" in doubts[0]
-
-
-# ---- what stands before the target, learned from where it is never seen
 
 
 def view(centre, sides, post):
@@ -290,37 +206,12 @@ def passing(sides, post=(0, 0)):
     return outlines, centres, areas, np.linalg.norm(centres - places, axis=1)
 
 
-@pytest.mark.parametrize("diameter", [24, 40, 60])
+@pytest.mark.parametrize("diameter", [24, 60])
 def test_views_that_are_cut_by_a_post_are_of_parts(diameter):
     *seen, off = passing((diameter, diameter), post=(90, 110))
+    *whole, _ = passing((diameter, diameter // 2))
+    assert not hidden(*whole).any()
     found, cut = hidden(*seen), off > 0.02 * diameter + 0.5
     assert cut.sum() >= 6
     assert found[cut].all()
     assert found[~cut].mean() < 0.15  # those that just touch it
-
-
-@pytest.mark.parametrize("sides", [(40, 40), (60, 20), (20, 60)])
-def test_where_nothing_hides_the_target_all_views_are_whole(sides):
-    *seen, off = passing(sides)
-    assert off.max() < 0.5
-    assert not hidden(*seen).any()
-
-
-def test_what_touches_other_things_does_not_say_where_the_target_is_hidden():
-    seen, centres, areas, _ = passing((40, 40))
-    alone = np.full(80, True)
-    alone[35:45], outlines = False, list(seen)  # two in one, whose outline is lean
-    for i in np.flatnonzero(~alone):
-        outlines[i], centres[i], areas[i] = view(centres[i], (240, 20), (0, 0))
-    found = hidden(outlines, centres, areas, alone)
-    assert hidden(outlines, centres, areas)[alone].any()
-    assert not found[alone].any()
-
-
-def test_a_large_ball_behind_a_post_is_seen_whole_or_not_at_all(tmp_path):
-    phone = Phone("wood", 64, colour=(250, 225, 15), noise=4, occluder=True,
-                  image_size=(320, 240), frames=60)  # fmt: skip
-    truth, _ = write_phone(tmp_path / "clip.mp4", phone, 2)
-    error = np.linalg.norm(track(tmp_path / "clip.mp4").pixels - truth, axis=1)
-    assert np.isfinite(error).mean() > 0.4
-    assert np.nanmax(error) < 1.5

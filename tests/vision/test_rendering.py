@@ -14,7 +14,6 @@ from vidsindy_lite.vision.rendering import (
     SHAPES,
     Scene,
     coverage,
-    draw_frames,
     render,
     render_labelled,
     render_restless,
@@ -35,7 +34,7 @@ def drawn_centroid_and_area(frame, empty, colour):
     ) / area, area
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20)
 @given(
     shape=st.sampled_from(SHAPES),
     size=st.floats(8, 40),
@@ -65,16 +64,6 @@ def test_labels_of_a_frame():
         np.testing.assert_array_equal(labelled.frame, frame)
 
 
-def test_scenery_stands_in_for_the_background():
-    scenery = np.random.default_rng(0).integers(0, 255, (80, 96, 3), np.uint8)
-    before = scenery.copy()
-    scene = Scene(occluders=((0, 0, 10, 10),), image_size=SMALL)
-    (drawn,) = draw_frames(np.array([[60.0, 40.0]]), scene, 0, np.eye(2)[None], scenery)
-    np.testing.assert_array_equal(drawn.frame[:, 10:40], scenery[:, 10:40])
-    assert (drawn.frame[:10, :10] != scenery[:10, :10]).any()
-    np.testing.assert_array_equal(scenery, before)
-
-
 def test_a_restless_background_moves_behind_the_target():
     scene, track = Scene("bricks", size=16, image_size=SMALL), np.full((3, 2), [48.0, 40.0])
     shifts = np.array([[0, 0], [5, -3], [0, 0]])
@@ -85,16 +74,6 @@ def test_a_restless_background_moves_behind_the_target():
     for bad in (shifts[:2], shifts / 2):
         with pytest.raises(ValueError, match=r"shifts: must be integers .* \(3, 2\), got"):
             next(render_restless(track, scene, bad))
-
-
-def test_size_variation_keeps_the_centroid():
-    track = np.tile([48.3, 40.6], (40, 1))
-    scene = Scene("plain", "irregular", 24, size_variation=0.4, image_size=SMALL)
-    empty = next(render([[np.nan, np.nan]], scene))
-    looks = [drawn_centroid_and_area(f, empty, "red") for f in render(track, scene)]
-    assert np.abs([c - track[0] for c, _ in looks]).max() < 0.02
-    areas = np.array([a for _, a in looks])
-    assert areas.max() / areas.min() > 3
 
 
 def test_shapes_map_the_outline_and_keep_the_centroid():
@@ -112,22 +91,6 @@ def test_shapes_map_the_outline_and_keep_the_centroid():
     assert np.ptp(np.flatnonzero(wide.any(axis=1))) == pytest.approx(24, abs=1.5)
 
 
-@pytest.mark.parametrize("shapes", [np.eye(2), np.ones((3, 2, 2)), np.full((2, 2, 2), np.nan)])
-def test_render_rejects_shapes(shapes):
-    with pytest.raises(ValueError, match=r"shapes: must be finite, of shape \(2, 2, 2\), got"):
-        render(np.zeros((2, 2)), Scene(), shapes=shapes)
-
-
-@pytest.mark.parametrize("background", BACKGROUNDS)
-def test_target_stands_out_of_every_background(background):
-    scene, seed = Scene(background), 1
-    frame = next(render([[np.nan, np.nan]], scene, seed)).astype(float)
-    for colour in COLOURS.values():
-        distance = np.linalg.norm(frame - colour, axis=-1)
-        assert distance.min() > 60
-        assert np.median(distance) > 90
-
-
 def test_target_behind_an_occluder_and_outside_leaves_no_trace():
     scene = Scene("wood", size=10, occluders=((40, 10, 20, 60),), image_size=SMALL)
     empty, behind, outside, partly = render(
@@ -140,28 +103,18 @@ def test_target_behind_an_occluder_and_outside_leaves_no_trace():
     assert not changed[:, 40:60].any()
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_tree_hides_what_is_behind_it_and_nothing_else(seed):
+def test_a_tree_hides_what_is_behind_it_and_nothing_else():
     box = (30, 20, 60, 76)
     scene = Scene("sky", size=90, colour="magenta", trees=(box,), image_size=(128, 96))
-    empty, full = render([[np.nan, np.nan], [63.5, 47.5]], scene, seed)
+    empty, full = render([[np.nan, np.nan], [63.5, 47.5]], scene)
     hidden = (full == empty).all(axis=-1)[27:69, 43:84]  # well inside the disc
     assert 0.2 < hidden.mean() < 1
     inside = np.s_[box[1] : box[1] + box[3], box[0] : box[0] + box[2]]
-    bare = next(render([[np.nan, np.nan]], replace(scene, trees=()), seed))
+    bare = next(render([[np.nan, np.nan]], replace(scene, trees=())))
     changed = (bare != empty).any(axis=-1)
     assert changed[inside].sum() == changed.sum() > 0
     assert changed[95, 58:62].all()  # the trunk stands on the lower side
     assert np.array_equal(changed[27:69, 43:84], hidden)
-
-
-def test_target_across_the_border_is_clipped():
-    scene = Scene("plain", size=20, image_size=SMALL)
-    empty, corner = render([[np.nan, np.nan], [0, 0]], scene)
-    changed = np.any(corner != empty, axis=-1)
-    assert changed[0, 0]
-    assert not changed[15:].any()
-    assert not changed[:, 15:].any()
 
 
 def test_noise_has_the_variance_asked_for():
@@ -172,21 +125,15 @@ def test_noise_has_the_variance_asked_for():
     assert not np.array_equal(noisy[0], noisy[1])
 
 
-def test_a_seed_gives_the_same_frames_and_another_seed_others():
+def test_a_seed_gives_the_same_frames_and_file_and_another_seed_others(tmp_path):
     scene = Scene.random(7, image_size=SMALL, noise_variance=0.01)
     assert scene == Scene.random(np.random.default_rng(7), image_size=SMALL, noise_variance=0.01)
     track = [[40.0, 40.0], [50.0, 42.0]]
     first, again, other = (list(render(track, scene, seed)) for seed in (1, 1, 2))
-    assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
+    assert np.array_equal(first, again)
     assert not np.array_equal(first[0], other[0])
-
-
-def test_render_video_writes_what_render_yields(tmp_path):
-    scene = Scene("hills", turns=1, image_size=SMALL)
-    track = np.linspace([20, 20], [70, 60], 6)
-    path = render_video(tmp_path / "clip.mkv", track, scene, seed=3)
-    for a, b in zip(read_video(path), render(track, scene, 3), strict=True):
-        assert np.array_equal(a, b)
+    path = render_video(tmp_path / "clip.mkv", track, scene, seed=1)
+    assert np.array_equal(first, list(read_video(path)))
 
 
 @pytest.mark.parametrize(
@@ -194,29 +141,26 @@ def test_render_video_writes_what_render_yields(tmp_path):
     [
         (np.zeros((4, 3)), r"track: must have shape \(n, 2\)"),
         (np.zeros((0, 2)), r"track: must have shape \(n, 2\)"),
+        (np.zeros((4, 5)), r"track: must have shape \(n, 4\)"),
         ([[np.inf, 0]], "track: must be finite or NaN"),
     ],
 )
 def test_render_rejects(track, message):
     with pytest.raises(ValueError, match=message):
         render(track, Scene())
+    with pytest.raises(ValueError, match="scene: must be of type Scene, got 'hills'"):
+        render([[40, 40]], "hills")
+    for shapes in (np.eye(2), np.ones((3, 2, 2)), np.full((2, 2, 2), np.nan)):
+        with pytest.raises(ValueError, match=r"shapes: must be finite, of shape \(2, 2, 2\), got"):
+            render(np.zeros((2, 2)), Scene(), shapes=shapes)
 
 
-@pytest.mark.parametrize("seed", [-1, 1.5, "a", None])
+@pytest.mark.parametrize("seed", [-1, 1.5, None])
 def test_seeds_are_whole_numbers(tmp_path, seed):
     with pytest.raises(ValueError, match="seed: must be an integer of at least 0, got"):
         render_video(tmp_path / "clip.mkv", [[40, 40]], Scene(), seed=seed)
     with pytest.raises(ValueError, match="rng: must be an integer of at least 0, got"):
         Scene.random(seed)
-
-
-def test_masked_rows_of_a_track_are_frames_without_target():
-    scene = Scene("plain", image_size=SMALL)
-    masked = np.ma.masked_array([[40, 40], [50, 40]], mask=[[0, 0], [0, 1]])
-    seen, hidden = render(masked, scene)
-    empty = next(render([[np.nan, np.nan]], scene))
-    assert not np.array_equal(seen, empty)
-    assert np.array_equal(hidden, empty)
 
 
 @settings(max_examples=30)
@@ -250,12 +194,6 @@ def test_of_several_targets_the_later_ones_are_in_front():
     assert changed[1].sum() == pytest.approx(2 * np.pi * 100, rel=0.15)
 
 
-def test_a_track_of_an_odd_number_of_columns_is_told_of_the_even_one_below():
-    for width, even in ((1, 2), (3, 2), (5, 4)):
-        with pytest.raises(ValueError, match=rf"track: must have shape \(n, {even}\)"):
-            render(np.zeros((4, width)), Scene())
-
-
 @pytest.mark.parametrize(
     ("box", "brown"),
     [((20, 10, 12, 40), True), ((20, 10, 40, 40), True), ((20, 10, 40, 39), False)],
@@ -271,9 +209,6 @@ def test_posts_are_brown_and_hedges_are_green(box, brown):
     changed = np.abs(frame.astype(int) - plain).max(axis=2) > 20
     assert np.flatnonzero(changed.any(axis=0)).tolist() == [*range(left, left + width)]
     assert np.flatnonzero(changed.any(axis=1)).tolist() == [*range(top, top + height)]
-
-
-# ---- scenes: outlines against exact geometry, random scenes, and bad arguments
 
 
 @pytest.mark.parametrize(
@@ -297,7 +232,9 @@ def test_posts_are_brown_and_hedges_are_green(box, brown):
         ("image_size", (512,)),
         ("occluders", ((1, 2, 3),)),
         ("occluders", ((500, 0, 50, 50),)),
-        ("occluders", ((0, 0, 1, 50),)),
+        ("occluders", ((0, 0, 3, 50),)),
+        ("occluders", ((0, 1, 4, 512),)),
+        ("occluders", ((-1, 0, 9, 9),)),
         ("trees", ((1, 2, 3),)),
         ("trees", ((0, 500, 50, 50),)),
     ],
@@ -322,47 +259,19 @@ def test_outlines_have_the_area_of_their_disc_and_their_centroid_at_zero(shape, 
     np.testing.assert_allclose(centroid, 0, atol=1e-9 * size)
 
 
-def test_outlines_are_of_their_kind():
-    disc = Scene(size=20).outline()
-    assert disc.shape == (128, 2)
-    np.testing.assert_allclose(np.hypot(*disc.T), 10, rtol=1e-3)
-    counts, spreads = set(), []
-    for seed in range(60):
-        corners = Scene(shape="polygon", size=20, shape_seed=seed).outline()
-        counts.add(len(corners))
-        turns = np.diff(np.unwrap(np.arctan2(*corners.T[::-1]), period=2 * np.pi))
-        # Corners are as far apart as those of a regular one, but for .4 of that.
-        spreads.append(np.abs(turns * len(corners) / (2 * np.pi) - 1).max())
-        blob = Scene(shape="irregular", size=20, shape_seed=seed).outline()
-        assert len(blob) == 128
-        assert 1.1 < np.hypot(*blob.T).max() / np.hypot(*blob.T).min() < 4
-    assert counts == {3, 4, 5, 6}
-    assert 0.2 < max(spreads) < 0.8
-
-
 def test_random_scenes_are_drawn_from_their_ranges():
-    scenes = [Scene.random(seed) for seed in range(300)]
+    scenes = [Scene.random(seed) for seed in range(200)]
     assert {s.background for s in scenes} == set(BACKGROUNDS)
     assert {s.shape for s in scenes} == set(SHAPES)
     assert {s.colour for s in scenes} == set(COLOURS)
     for name, low, high in (("size", 8, 40), ("turns", -10, 10), ("tumbling", 0, 1)):
         values = np.array([getattr(s, name) for s in scenes])
-        assert low <= values.min() < low + 0.03 * (high - low)
-        assert high >= values.max() > high - 0.03 * (high - low)
+        assert low <= values.min() < low + 0.04 * (high - low)
+        assert high >= values.max() > high - 0.04 * (high - low)
     assert Scene.random(3) == Scene.random(np.random.default_rng(3)) != Scene.random(4)
     assert Scene.random(3, size=9, noise_variance=0.01).size == 9
-
-
-def test_the_largest_that_a_scene_may_hold():
-    scene = Scene(size=100, size_variation=0.5, noise_variance=0.1, occluders=[[0, 0, 4, 512]],
-                  trees=((508, 508, 4, 4),), image_size=(512, 512))  # fmt: skip
-    assert scene.occluders == ((0, 0, 4, 512),)
-    for wrong in (((0, 1, 4, 512),), ((509, 0, 4, 4),), ((0, 0, 3, 9),), ((-1, 0, 9, 9),)):
-        with pytest.raises(ValueError, match="occluders: "):
-            Scene(occluders=wrong)
-
-
-# ---- drawn backgrounds look as they did: figures and weights rest on them
+    largest = Scene(size=100, size_variation=0.5, noise_variance=0.1, occluders=[[0, 0, 4, 512]])
+    assert largest.occluders == ((0, 0, 4, 512),)
 
 
 # Means and standard deviations of red, green and blue of an image of 256 x 192, seed 7.
@@ -385,10 +294,3 @@ def test_what_is_drawn_looks_as_it_did(name):
     assert image.dtype == np.uint8
     found = [*image.mean(axis=(0, 1)), *image.std(axis=(0, 1))]
     np.testing.assert_allclose(found, LOOKS[name], atol=0.1)
-
-
-def test_a_tree_stands_where_it_did():
-    image, here = rendering.tree(np.random.default_rng(7), (120, 160))
-    assert image.shape == (160, 120, 3)
-    np.testing.assert_allclose(here.mean(axis=1)[::40], [0, 0.85, 0.733, 0.15], atol=1e-3)
-    np.testing.assert_allclose([here[:80].mean(), here[80:].mean()], [0.681, 0.264], atol=1e-3)

@@ -8,11 +8,7 @@ from footage import Phone, write_phone
 from vidsindy_lite import track
 from vidsindy_lite.vision.steadying import (
     CameraMotion,
-    _by_corners,
-    _Key,
-    _Relief,
     carry,
-    displacement,
     grounds,
     pyramid,
     stands_still,
@@ -43,43 +39,13 @@ def test_a_plane_that_is_seen_more_from_the_side_has_a_map_of_eight_numbers():
     np.testing.assert_allclose(carry(found, corners), carry(tilt, corners), atol=0.2)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_what_only_half_of_the_corners_obey_is_no_reason_for_more_than_four_numbers(seed):
-    before = grains(seed)
-    after = cv2.warpAffine(before, np.array([[1, 0, 1.8], [0, 1, 0]]), SIZE)
-    stays = np.random.default_rng(seed).uniform(size=(12, 12)) < 0.55
-    stays = cv2.resize(stays.astype(np.uint8), SIZE, interpolation=cv2.INTER_NEAREST) > 0
-    after[stays] = before[stays]
-    found = followed(before, after)
-    (a, b, _), (c, d, _), (e, f, _) = found
-    np.testing.assert_allclose((d, c, e, f), (a, -b, 0, 0), atol=1e-9)
-
-
-@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(("share", "still"), [(0.0, False), (0.2, False), (0.45, True), (1, True)])
-def test_a_camera_moves_if_clearly_more_corners_share_a_motion_than_stay(seed, share, still):
-    before = grains(seed)
+def test_a_camera_moves_if_clearly_more_corners_share_a_motion_than_stay(share, still):
+    before = grains()
     after = cv2.warpAffine(before, np.array([[1, 0, 1.8], [0, 1, 0]]), SIZE)
     stays = np.s_[:, : int(share * SIZE[0])]
     after[stays] = before[stays]
     assert stands_still([before, after]) is still
-
-
-@pytest.mark.parametrize(("share", "told"), [(0.1, False), (0.5, True)])
-def test_what_a_few_of_the_corners_share_is_chance_and_tells_no_motion(share, told):
-    rng = np.random.default_rng(0)
-    before = grains()
-    after = before.copy()
-    for v in range(0, SIZE[1], 60):
-        for u in range(0, SIZE[0], 80):
-            move = [3.0, 0] if rng.uniform() < share else rng.uniform(-8, 8, 2)
-            here = np.array([[1, 0, move[0]], [0, 1, move[1]]])
-            moved = cv2.warpAffine(before, here, SIZE)
-            after[v : v + 60, u : u + 80] = moved[v : v + 60, u : u + 80]
-    key = _Key.of(_Relief.of(before), np.eye(3), 0.0)
-    found, alone = _by_corners(key.relief, key.points, _Relief.of(after), np.eye(3))
-    assert (found is not None) is told
-    assert told or not alone
 
 
 @pytest.mark.parametrize(("width", "told"), [(0.3, False), (1.0, True)])
@@ -99,49 +65,6 @@ def test_what_one_large_thing_shares_is_its_own_motion_not_the_cameras(width, to
     assert (stands_still(frames) is False) == told
 
 
-def test_pixels_by_which_maps_move_an_image():
-    shift = np.array([[1, 0, 3], [0, 1, -4], [0, 0, 1.0]])
-    found = displacement(np.stack([np.eye(3), shift, np.diag([1.1, 1, 1])]), (200, 100))
-    # The rms of a tenth of 40, 100 and 160 pixels.
-    np.testing.assert_allclose(found, [0, 5, np.sqrt((16 + 100 + 256) / 3)])
-
-
-def test_pixels_say_it_better_than_many_corners_in_noise():
-    rng = np.random.default_rng(0)
-    scene = cv2.GaussianBlur(rng.normal(0, 1, (280, 360)).astype(np.float32), (0, 0), 6)
-    scene = 130 + 10 * scene / scene.std()
-    frames, shifts = [], []
-    for k in range(12):
-        shift = np.array([1.5 * np.sin(k), 1.5 * np.cos(2 * k) - 1.5])
-        shifts.append(shift)
-        move = np.array([[1, 0, shift[0] - 20], [0, 1, shift[1] - 20]])
-        view = cv2.warpAffine(scene, move, (320, 240))[..., None]
-        noisy = view + rng.normal(0, 6, (240, 320, 3))
-        frames.append(np.clip(noisy, 0, 255).astype(np.uint8))
-    here = carry(steadied(frames, 1).maps, np.tile([160.0, 120], (12, 1)))
-    assert np.median(np.linalg.norm(here + shifts - [160, 120], axis=1)) < 0.05
-
-
-def clouds(u, noise, contrast, seed):
-    """A picture of clouds without corners, moved to the right; new noise each."""
-    scene = cv2.GaussianBlur(np.random.default_rng(0).normal(size=(240, 320)), (0, 0), 12)
-    scene = cv2.warpAffine(120 + contrast * scene / scene.std(), np.array([[1.0, 0, u], [0, 1, 0]]),
-                           (320, 240), borderMode=cv2.BORDER_REFLECT)  # fmt: skip
-    rng = np.random.default_rng(seed)
-    picture = scene[..., None] + rng.normal(0, noise, (240, 320, 3))
-    return np.clip(picture, 0, 255).astype(np.uint8)
-
-
-@pytest.mark.parametrize(
-    ("u", "noise", "contrast", "drifted"),
-    [(3, 1, 20, True), (0, 2, 20, False), (3, 1, 0, None)],
-    ids=["moves", "rests", "plain"],
-)
-def test_all_pixels_tell_of_a_motion_where_there_are_no_corners(u, noise, contrast, drifted):
-    views = clouds(0, noise, contrast, seed=1), clouds(u, noise, contrast, seed=2)
-    assert stands_still(views) is (None if drifted is None else not drifted)
-
-
 def test_reduced_maps_and_their_errors_become_those_of_whole_pixels():
     shift = np.array([[1, 0, 2], [0, 1, -3], [0, 0, 1.0]])
     tilt = np.array([[1, 0, 0], [0, 1, 0], [0.001, 0, 1.0]])
@@ -156,20 +79,6 @@ def test_reduced_maps_and_their_errors_become_those_of_whole_pixels():
         end = carry(here, np.array([[41.5, 81.5]]))[0]
         np.testing.assert_allclose(end, [4 * u + 1.5, 4 * v + 1.5])
         assert here[2, 2] == pytest.approx(1)
-
-
-def test_a_new_key_frame_adds_its_error_to_all_that_follow():
-    # By a tenth of the width each: little is left of the first frame after seven of them.
-    scene = cv2.resize(grains(), (1600, 720))
-    motion = steadied((scene[:240, 32 * k : 32 * k + 320] for k in range(9)), 1)
-    places = motion.maps[:, :2, 2]
-    np.testing.assert_allclose(places, np.column_stack([32 * np.arange(9), 0 * np.arange(9)]),
-                               atol=0.3)  # fmt: skip
-    assert min(motion.errors[7:]) > max(motion.errors[1:4])
-    assert max(motion.errors) < 0.3
-
-
-# ---- two views of one scene, laid on each other by all of their pixels, where the motion is known
 
 
 CLOUDY = 320, 240
@@ -208,7 +117,6 @@ def about_the_middle(**change):
     [
         (about_the_middle(turn=0.06), 1.0),
         (about_the_middle(scale=1.05), 1.0),
-        (similar(0, 0), 1.0),
         (similar(0.7, -0.4), 1.0),
         (similar(-6, 9, 0.01), 1.1),
         (similar(14, -3, -0.02, 1.01), 0.8),
@@ -223,16 +131,6 @@ def test_shift_turn_and_scale_of_clouds(move, light):
     assert miss.mean() <= 8 * found.error < 0.5
 
 
-def test_the_perspective_of_a_guess_does_no_harm():
-    move = similar(3, -2, 0.01)
-    guess = move.copy()
-    guess[2, :2] = 1e-4, -5e-5
-    found = align(pyramid(sight(0)), pyramid(sight(0, move)), guess)
-    points = np.array([[40, 40, 1], [280, 40, 1], [160, 120, 1], [280, 200, 1.0]])
-    ends = points @ found.map.T
-    assert np.linalg.norm((ends / ends[:, 2:] - points @ move.T)[:, :2], axis=1).max() < 0.1
-
-
 def test_what_moves_on_its_own_is_left_aside():
     move = similar(3, 2)
     views = [sight(1), sight(1, move)]
@@ -240,21 +138,6 @@ def test_what_moves_on_its_own_is_left_aside():
         view[60:180, left : left + 60] = (20, 20, 160)  # a large thing that goes elsewhere
     found = align(*map(pyramid, views), np.eye(3))
     assert np.linalg.norm(found.map[:2, 2] - move[:2, 2]) < 0.5
-
-
-@pytest.mark.parametrize("light", [0.85, 1.0, 1.15])
-def test_a_dark_post_in_another_light_shifts_nothing(light):
-    move = similar(4.3, -2.6)
-    views = [sight(2).astype(np.float32), sight(2, move).astype(np.float32)]
-    for view, here in zip(views, (np.eye(3), move), strict=True):
-        post = np.zeros(CLOUDY[::-1], np.float32)
-        post[:, 150:168] = 1
-        post = cv2.warpAffine(post, here[:2], CLOUDY)[..., None]
-        view[:] = view * (1 - post) + 30 * post
-    before, after = sight(2), sight(2, move)
-    before[:], after[:] = views[0], np.clip(light * views[1], 0, 255)
-    found = align(pyramid(before), pyramid(after), np.eye(3))
-    assert np.linalg.norm(found.map[:2, 2] - move[:2, 2]) < 0.15
 
 
 @pytest.mark.parametrize("things", [0, 3])
@@ -267,20 +150,17 @@ def test_noise_and_a_few_things_tell_nothing(things):
             wall[v : v + 12, u : u + 12] = 40
         views.append(np.clip(wall + rng.normal(0, 3, wall.shape), 0, 255).astype(np.uint8))
     assert align(*map(pyramid, views), np.eye(3)).error > 2
+    assert things or stands_still(views) is None
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_clouds_tell_a_motion_better_than_leaves_that_sway(seed):
-    rng = np.random.default_rng(seed)
-    shift = np.array([5, -4])
-    views = [sight(seed, noise=1), sight(seed, similar(*shift), noise=1)]
-    for _ in range(30):
-        leaf = rng.uniform(30, [290, 210])
-        for view, here in zip(views, (leaf, leaf + shift + rng.uniform(-2.5, 2.5, 2)), strict=True):
-            cv2.circle(view, tuple(np.rint(16 * here).astype(int)), 48, (90, 90, 90), -1, 8, 4)
+def test_all_pixels_tell_of_a_motion_where_there_are_no_corners():
+    move = similar(3, -4)
+    views = [sight(0), sight(0, move)]
+    assert stands_still(views) is False
     motion = steadied(views, 1)
     assert motion.errors[1] < 0.15
-    assert np.linalg.norm(np.linalg.inv(motion.maps[1])[:2, 2] - shift) < 0.5
+    np.testing.assert_allclose(np.linalg.inv(motion.maps[1])[:2, 2], move[:2, 2], atol=0.1)
+    assert stands_still([views[0], sight(0, similar(0, 1e-6))]) is True
 
 
 def test_a_camera_held_before_a_plain_wall_is_doubted(tmp_path):
@@ -290,84 +170,9 @@ def test_a_camera_held_before_a_plain_wall_is_doubted(tmp_path):
     assert any("too plain to tell whether the camera moves" in doubt for doubt in found.warnings)
 
 
-def test_a_plain_wall_tells_no_motion(tmp_path):
-    phone = Phone("plain", 30, person=True, image_size=(320, 240), frames=40)
-    write_phone(tmp_path / "clip.mp4", phone, 3)
-    found = track(tmp_path / "clip.mp4")
-    assert found.maps is None
-
-
-def waves(faint, u=0.0, v=0.0):
-    """Plain waves to the right, grey levels, and such faint ones downwards, shifted by pixels."""
-    down, right = np.mgrid[:120, :160].astype(float)
-    plain = 20 * np.sin((right - u) / 9) + 20 * np.sin((right - u) / 5 + 1)
-    return [(100 + plain + faint * np.sin((down - v) / 11)).astype(np.float32)]
-
-
-def test_the_less_is_told_of_a_direction_the_closer_to_the_guess_it_stays():
-    faints = np.geomspace(1e-3, 1, 16)
-    found = [align(waves(faint), waves(faint, 2, 3), np.eye(3)) for faint in faints]
-    shifts = np.array([one.map[:2, 2] for one in found])  # of an image twice as large
-    np.testing.assert_allclose(shifts[:, 0], 4, atol=0.01)
-    assert (np.diff(shifts[:, 1]) > -0.01).all()
-    np.testing.assert_allclose(shifts[[0, -1], 1], (0, 6), atol=0.5)
-
-
-@pytest.mark.parametrize("turn", [0.05, 0.2])
-def test_a_turn_alone_is_followed_to_its_end(turn):
-    # Clouds that are the same upside down tell no shift at all, at no step.
-    clouds = cv2.GaussianBlur(np.random.default_rng(0).normal(size=(241, 321)), (0, 0), 8)
-    clouds = 20 * (clouds + clouds[::-1, ::-1]) / clouds.std()
-    views = []
-    for angle in (0.0, turn):
-        middle = similar(160, 120) @ similar(0, 0, -angle) @ similar(-79.5, -59.5)
-        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        views.append([cv2.warpAffine(clouds, middle[:2], (160, 120), flags=flags)])
-    found = align(*[[np.float32(100 + level) for level in view] for view in views], np.eye(3))
-    assert np.arctan2(found.map[1, 0], found.map[0, 0]) == pytest.approx(turn, abs=1e-4)
-
-
-@pytest.mark.parametrize(("gone", "found"), [(0.55, True), (0.8, False)])
-@pytest.mark.parametrize("across", [True, False])
-def test_two_views_must_share_three_tenths_of_what_they_show(across, gone, found):
-    rng = np.random.default_rng(0)
-    cloud = cv2.GaussianBlur(rng.normal(size=(560, 640)).astype(np.float32), (0, 0), 6)
-    scene = (100 + 20 * cloud / cloud.std()).astype(np.float32)
-    u, v = (round(gone * 160), 0) if across else (0, round(gone * 120))
-    before, after = scene[200:320, 200:360], scene[200 + v : 320 + v, 200 + u : 360 + u]
-    guess = similar(-2.0 * u, -2.0 * v)
-    told = align_on(grounds([before]), [after], guess)
-    assert (told is not None) == found
-    if told:
-        np.testing.assert_allclose(told.map, guess, atol=0.05)
-
-
-@pytest.mark.parametrize(("width", "told"), [(20, False), (110, True)])
-def test_what_few_blocks_tell_may_move_on_its_own(width, told):
-    rng = np.random.default_rng(0)
-    cloud = cv2.GaussianBlur(rng.normal(size=(130, 170)).astype(np.float32), (0, 0), 3)
-    cloud *= 20 / cloud.std()
-    views = []
-    for u in (5, 6):
-        view = np.full((120, 160), 100, np.float32)
-        view[40 : 40 + width // 2, 30 : 30 + width] += cloud[
-            45 : 45 + width // 2, 30 + u : 30 + u + width
-        ]
-        views.append(view + rng.normal(0, 0.5, view.shape).astype(np.float32))
-    found = align_on(grounds(views[:1]), views[1:], np.eye(3))
-    assert np.isfinite(found.error) == told
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_frames_that_share_mere_noise_tell_no_map(seed):
-    before, after = np.random.default_rng(seed).normal(128, 3, (2, 360, 480, 3))
-    views = [np.clip(one, 0, 255).astype(np.uint8) for one in (before, after)]
-    assert not np.isfinite(align(*map(pyramid, views), np.eye(3)).error)
-
-
 def test_the_error_of_a_map_is_about_that_by_which_it_misses():
     errors, misses = [], []
-    for seed in range(12):
+    for seed in range(6):
         move = similar(1.3, -0.8, 0.004)
         found = align(pyramid(sight(seed, noise=4)), pyramid(sight(seed, move, noise=4)), np.eye(3))
         points = np.array([[u, v, 1.0] for u in (20, 160, 300) for v in (20, 120, 220)])

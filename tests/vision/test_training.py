@@ -9,28 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.vision import rendering as scenery
 from vidsindy_lite.vision import training
 from vidsindy_lite.vision.network import anchors
-
-# Mean and standard deviation of the training frames of seeds 0 to 23.
-FRAMES = (
-    [195, 141, 206, 93, 144, 85, 57, 94, 129, 88, 67, 125]
-    + [238, 132, 138, 128, 135, 162, 118, 158, 113, 94, 131, 152],
-    [55, 80, 45, 63, 77, 41, 35, 58, 36, 31, 33, 30]
-    + [23, 69, 65, 67, 60, 45, 68, 44, 36, 58, 43, 70],
-)
-
-
-def test_training_frames_look_as_they_did():
-    kinds = enumerate(training.SEEN_BACKGROUNDS)
-    pool = np.stack(
-        [scenery.BACKGROUNDS[kind](np.random.default_rng(i), (512, 512)) for i, kind in kinds]
-    )
-    frames = [training.training_frame(np.random.default_rng(k), pool)[0].frame for k in range(24)]
-    mean, spread = ([stat(frame) for frame in frames] for stat in (np.mean, np.std))
-    np.testing.assert_allclose(mean, FRAMES[0], atol=1)
-    np.testing.assert_allclose(spread, FRAMES[1], atol=1)
 
 
 @pytest.fixture
@@ -40,31 +20,18 @@ def small(monkeypatch):
     monkeypatch.setattr(training, "_EACH", 1)
 
 
-@pytest.mark.slow
 def test_a_training_again_gives_the_same_weights_and_log(small, tmp_path, capsys):
-    log = training.train(tmp_path / "one.pt", seed=3, steps=5)
-    command = ["train-detector", "--seed", "3", "--steps", "5", "--output"]
+    log = training.train(tmp_path / "one.pt", seed=3, steps=2)
+    command = ["train-detector", "--seed", "3", "--steps", "2", "--output"]
     assert main([*command, str(tmp_path / "other.pt")]) == 0
-    assert "10 frames" in capsys.readouterr().out
+    assert "4 frames" in capsys.readouterr().out
     one, other = (torch.load(tmp_path / f"{n}.pt", weights_only=True) for n in ("one", "other"))
     assert all(torch.equal(one[name], other[name]) for name in one)
+    training.train(tmp_path / "third.pt", seed=4, steps=2)
+    third = torch.load(tmp_path / "third.pt", weights_only=True)
+    assert not torch.equal(one["where.1.bias"], third["where.1.bias"])
     assert json.loads((tmp_path / "other.json").read_text()) == log
-    assert sorted(p.suffix for p in tmp_path.iterdir()) == [".json", ".json", ".pt", ".pt"]
-
-
-def test_another_seed_gives_other_weights(small, tmp_path):
-    for seed in (1, 2):
-        training.train(tmp_path / f"{seed}.pt", seed=seed, steps=2)
-    weights = [torch.load(tmp_path / f"{s}.pt", weights_only=True)["where.1.bias"] for s in (1, 2)]
-    assert not torch.equal(*weights)
-
-
-def test_the_log_of_a_training_tells_the_loss_of_block_after_block():
-    log = training._training_log(3, [float(step) for step in range(251)], 7)
-    assert (log["seed"], log["steps"], log["parameters"]) == (3, 251, 7)
-    assert log["frames"] == 251 * training.BATCH
-    assert log["steps_per_loss"] == 2
-    assert log["loss"] == [*np.arange(0.5, 250, 2), 250]  # the last one stands alone
+    assert sorted(p.suffix for p in tmp_path.iterdir()) == [".json"] * 3 + [".pt"] * 3
 
 
 def test_the_loss_of_perfect_predictions_is_least():
@@ -99,21 +66,3 @@ def test_training_frames_show_what_their_labels_say(seed):
     assert 0 <= drawn.visible <= 1 + 1e-9
     assert np.array_equal(np.isnan(centre), np.isnan(drawn.extent))
     assert drawn.visible == 0 or (drawn.extent > 3).all()
-
-
-def test_the_larger_a_target_the_more_anchors_are_to_be_sure_of_it():
-    place = anchors(16, 16)
-    centre = place[120:121]
-    squared = (place - centre).square().sum(dim=1)
-    for size, spread in ((10.0, 4.0), (40.0, 8.0), (80.0, 16.0)):
-        sides = torch.tensor([[1.2 * size, 0.8 * size]])
-        boxes = torch.cat([centre, sides], dim=1).T.expand(4, 256)
-        losses = [
-            training.detection_loss(
-                torch.cat([boxes, torch.exp(-squared / (2 * (factor * spread) ** 2))
-                           .clamp(1e-6, 1 - 1e-6).logit()[None]])[None],
-                centre, sides, torch.ones(1),
-            ).item()
-            for factor in (0.8, 1.0, 1.25)
-        ]  # fmt: skip
-        assert losses[1] < 1e-4 < min(losses[0], losses[2])

@@ -7,6 +7,7 @@ import struct
 import subprocess
 import sys
 import wave
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 
@@ -14,8 +15,6 @@ import av
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from phones import waver, write_at
 
 import vidsindy_lite as vl
@@ -38,7 +37,7 @@ SMALL = (96, 80)
 @pytest.mark.parametrize(
     ("name", "codec"), [("clip.mov", None), ("clip.mkv", None), ("clip.avi", "FFV1")]
 )
-@pytest.mark.parametrize("size", [SMALL, (128, 96), (101, 67), (1, 1)])
+@pytest.mark.parametrize("size", [(101, 67), (1, 1)])
 def test_lossless_files_are_exact(tmp_path, name, codec, size):
     rng = np.random.default_rng(0)
     frames = [rng.integers(0, 256, (size[1], size[0], 3), np.uint8) for _ in range(5)]
@@ -49,22 +48,12 @@ def test_lossless_files_are_exact(tmp_path, name, codec, size):
     assert video_info(path) == (5, pytest.approx(30), size)
 
 
-@pytest.mark.parametrize(
-    ("name", "codec"), [("a.mp4", "mp4v"), ("a.avi", "MJPG"), ("a.mp4", "H264")]
-)
-def test_lossy_files_are_close(tmp_path, name, codec):
-    frames = list(render(np.full((4, 2), 45.0), Scene("sky", image_size=SMALL)))
-    back = list(read_video(write_video(tmp_path / name, frames, codec=codec)))
-    assert len(back) == 4
-    assert 0 < np.abs(np.array(back, float) - np.array(frames, float)).mean() < 6
-
-
 def test_files_of_still_backgrounds_are_small_and_all_alike(tmp_path):
-    scene, track = Scene("hills", size=12), np.linspace([100, 100], [200, 180], 120)
+    scene, track = Scene("hills", size=12), np.linspace([100, 100], [200, 180], 60)
     paths = [render_video(tmp_path / name, track, scene) for name in ("a.mov", "b.mov", "c.mkv")]
     first, again, other = (path.read_bytes() for path in paths)
     assert first == again
-    assert len(first) < 0.1 * len(other)
+    assert len(first) < 0.15 * len(other)
 
 
 @pytest.mark.parametrize("suffix", [".mov", ".mkv"])
@@ -73,8 +62,9 @@ def test_one_frame_is_that_of_all(tmp_path, suffix):
     path = write_video(tmp_path / f"clip{suffix}", frames)
     for number in (119, 0, 1, 49, 50, 51, 75):
         assert np.array_equal(read_frame(path, number), frames[number])
-    with pytest.raises(ValueError, match=r"number: .* must have that frame, got 120"):
-        read_frame(path, 120)
+    for number in (120, 2**63, 10**30):
+        with pytest.raises(ValueError, match=rf"number: .*must .*, got {number}"):
+            read_frame(path, number)
     with pytest.raises(ValueError, match="number: must be an integer of at least 0, got -1"):
         read_frame(path, -1)
 
@@ -85,13 +75,11 @@ def test_nothing_half_written_is_left(tmp_path, suffix):
         yield np.zeros((64, 64, 3), np.uint8)
         raise RuntimeError("interrupted")
 
+    path = tmp_path / f"clip{suffix}"
     with pytest.raises(RuntimeError, match="interrupted"):
-        write_video(tmp_path / f"clip{suffix}", frames())
+        write_video(path, frames())
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_failed_write_keeps_the_old_file(tmp_path):
-    path = write_video(tmp_path / "clip.mkv", [np.full((64, 64, 3), 7, np.uint8)])
+    write_video(path, [np.full((64, 64, 3), 7, np.uint8)])
     with pytest.raises(ValueError, match="at least one frame"):
         write_video(path, [])
     assert next(read_video(path)).mean() == 7
@@ -119,13 +107,17 @@ def test_write_video_rejects(tmp_path, name, options, error, message):
     "frame", [np.zeros((64, 64, 3)), np.zeros((64, 64), np.uint8), np.zeros((64, 80, 3), np.uint8)]
 )
 def test_write_video_rejects_frames(tmp_path, frame):
+    with pytest.raises(ValueError, match="frames: must be of type Iterable, got None"):
+        write_video(tmp_path / "clip.mkv", None)
     with pytest.raises(ValueError, match="^frames: .* at frame 1"):
         write_video(tmp_path / "clip.mkv", [np.zeros((64, 64, 3), np.uint8), frame])
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("read", [read_video, video_info])
-def test_reading_rejects(tmp_path, read):
+@pytest.mark.parametrize("read", [read_video, video_info, track])
+def test_reading_rejects(tmp_path, capfd, read):
+    with pytest.raises(ValueError, match="path: must be the name of a file, got 5"):
+        read(5)
     with pytest.raises(FileNotFoundError, match="path: no such video file"):
         read(tmp_path / "missing.mkv")
     empty = tmp_path / "empty.mkv"
@@ -143,75 +135,49 @@ def test_reading_rejects(tmp_path, read):
     writer.release()
     with pytest.raises(ValueError, match=f"path: must .* '{headers}'"):
         read(headers)
-
-
-def test_what_is_no_scene_path_or_frames_is_named(tmp_path):
-    with pytest.raises(ValueError, match="scene: must be of type Scene, got 'hills'"):
-        render([[40, 40]], "hills")
-    with pytest.raises(ValueError, match="path: must be the name of a file, got None"):
-        write_video(None, [])
-    with pytest.raises(ValueError, match="frames: must be of type Iterable, got None"):
-        write_video(tmp_path / "clip.mkv", None)
-    for read in (read_video, video_info):
-        with pytest.raises(ValueError, match="path: must be the name of a file, got 5"):
-            read(5)
-
-
-def test_frames_are_counted_where_the_header_states_no_number(tmp_path):
-    rng = np.random.default_rng(0)
-    path, cut = tmp_path / "clip.mkv", tmp_path / "cut.mkv"
-    fourcc = cv2.VideoWriter_fourcc(*"FFV1")
-    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, fourcc, 25, SMALL)
-    for _ in range(200):
-        writer.write(rng.integers(0, 256, (*SMALL[::-1], 3), np.uint8))
-    cut.write_bytes(path.read_bytes())  # before the length is written into the header
-    writer.release()
-    assert video_info(path).frames == 200
-    assert 0 < video_info(cut).frames < 200
-    assert video_info(cut).frames == len(list(read_video(cut)))
-
-
-@pytest.mark.parametrize("seconds", [0.5, 3.0])
-def test_frames_of_a_file_with_sound_are_not_those_of_the_sound(tmp_path, seconds):
-    path = tmp_path / "clip.mkv"
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("ffv1", 25)
-        stream.width, stream.height = SMALL
-        stream.pix_fmt = "bgr0"
-        sound = container.add_stream("pcm_s16le", rate=8000, layout="mono")
-        for frame in drawn(30):
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, "rgb24")))
-        container.mux(stream.encode(None))
-        silence = np.zeros((1, int(8000 * seconds)), np.int16)
-        heard = av.AudioFrame.from_ndarray(silence, "s16", "mono")
-        heard.sample_rate = 8000
-        container.mux(sound.encode(heard))
-        container.mux(sound.encode(None))
-    assert video_info(path) == (30, 25, SMALL)
-    assert len(list(read_video(path))) == 30
-
-
-def test_frames_of_changing_duration_are_counted_and_those_that_are_cut_off(tmp_path):
-    times = np.cumsum(np.random.default_rng(0).integers(5, 60, 50))
-    path = write_in_ms(tmp_path / "clip.mkv", times, drawn(50))
-    assert video_info(path).frames == 50
-    path = write_video(tmp_path / "clip.mkv", drawn(50))
-    path.write_bytes(path.read_bytes()[:-1000])
-    assert video_info(path).frames == 50 > len(list(read_video(path)))
-
-
-def test_broken_files_print_nothing(tmp_path, capfd):
-    whole = write_video(tmp_path / "clip.mkv", [np.zeros((64, 64, 3), np.uint8)] * 50)
-    cut, text = tmp_path / "cut.mkv", tmp_path / "text.mkv"
-    cut.write_bytes(whole.read_bytes()[:-3000])
-    text.write_text("this is no video\n" * 100)
-    assert 0 < len(list(read_video(cut))) < 50
-    with pytest.raises(ValueError, match="path: must be a video file"):
-        read_video(text)
+    with wave.open(str(tmp_path / "sound.wav"), "wb") as sound:
+        sound.setparams((1, 2, 8000, 0, "NONE", ""))
+        sound.writeframes(bytes(8000))
+    with pytest.raises(ValueError, match="path: must be a video file, got .* holds none"):
+        read(tmp_path / "sound.wav")
     assert capfd.readouterr().err == ""
 
 
-# ------------------------------------------------------------------------ against OpenCV's reader
+@pytest.mark.parametrize(
+    ("name", "codec", "pixels", "sound"),
+    [
+        ("a.avi", "mjpeg", "yuvj420p", 0),
+        ("a.mkv", "ffv1", "bgr0", 267),
+        ("b.mkv", "ffv1", "bgr0", 800),  # three times as long
+    ],
+)
+def test_half_a_file_is_told_and_frames_are_not_those_of_the_sound(
+    tmp_path, name, codec, pixels, sound
+):
+    path = tmp_path / name
+    with av.open(str(path), "w") as out:
+        stream = out.add_stream(codec, rate=30)
+        stream.width, stream.height, stream.pix_fmt = 80, 60, pixels
+        voice = out.add_stream("pcm_s16le", rate=8000, layout="mono") if sound else None
+        noise = np.random.default_rng(0).integers(0, 99, (60, 80, 3), np.uint8)
+        for k in range(60):
+            image = noise.copy()
+            image[20:30, 5 + k : 15 + k] = 230
+            out.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
+            if voice:
+                heard = av.AudioFrame.from_ndarray(np.zeros((1, sound), np.int16), "s16", "mono")
+                heard.sample_rate, heard.pts = 8000, sound * k
+                out.mux(voice.encode(heard))
+        out.mux(stream.encode())
+    whole = path.read_bytes()
+    assert video_info(path) == (60, 30, (80, 60))
+    assert len(list(read_video(path))) == 60
+    path.write_bytes(whole[: len(whole) // 2])
+    assert video_info(path).frames == pytest.approx(60, abs=1) or sound == 800
+    told = track(path).warnings
+    assert any("frames can be read: it is cut off" in warning for warning in told)
+    with pytest.raises(ValueError, match="target: its frame must be one of .*, got 55"):
+        track(path, target=vl.Hint(frame=55, box=(55, 15, 20, 20)))
 
 
 def drawn(n=30, **options):
@@ -240,36 +206,19 @@ ALL = [
 
 
 @pytest.mark.parametrize(("name", "codec"), ALL)
-def test_another_reader_sees_the_same_frames(tmp_path, name, codec):
+def test_another_reader_sees_the_same_frames_and_these_are_close(tmp_path, name, codec):
     path = write_video(tmp_path / name, drawn(), 30, codec)
-    pairs = zip(read_video(path), read_by_opencv(path), strict=True)
-    assert all(np.array_equal(ours, theirs) for ours, theirs in pairs)
+    ours = np.array(list(read_video(path)))
+    assert np.array_equal(ours, list(read_by_opencv(path)))
+    assert np.abs(ours.astype(float) - drawn()).mean() < 6
     capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     assert video_info(path).frames == capture.get(cv2.CAP_PROP_FRAME_COUNT) == 30
     assert video_info(path).fps == pytest.approx(capture.get(cv2.CAP_PROP_FPS), rel=1e-9)
     capture.release()
 
 
-@pytest.mark.parametrize(("name", "codec"), [("a.mp4", "mp4v"), ("a.avi", "MJPG")])
-def test_lossy_files_are_as_lossy_as_those_of_opencv(tmp_path, name, codec):
-    frames = drawn()
-    fourcc = cv2.VideoWriter_fourcc(*codec)
-    writer = cv2.VideoWriter(str(tmp_path / name), cv2.CAP_FFMPEG, fourcc, 25, SMALL)
-    for frame in frames:
-        writer.write(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
-    writer.release()
-    ours = write_video(tmp_path / f"ours_{name}", frames, codec=codec)
-    assert ours.stat().st_size == pytest.approx((tmp_path / name).stat().st_size, rel=0.1)
-    loss = [
-        np.abs(np.array(list(read_video(path)), float) - frames).mean()
-        for path in (ours, tmp_path / name)
-    ]
-    assert loss[0] == pytest.approx(loss[1], rel=0.1)
-
-
 @pytest.mark.parametrize("name", ["a.mov", "a.mkv"])
 def test_frames_belong_to_who_draws_on_them(tmp_path, name):
-    """One array that is drawn anew for each frame is written, and what is read may be drawn on."""
     frames = drawn(6)
 
     def in_one_array():
@@ -308,40 +257,18 @@ def test_the_view_of_a_turned_camera_is_upright(tmp_path, quarters):
     assert video_info(path).size == upright[0].shape[1::-1]
 
 
-# ------------------------------------------------------------------------------- times and numbers
-
-
-def write_in_ms(path, times, frames, codec="ffv1", pixels="bgr0", b_frames=0):
-    """A file whose frames are shown at these times, in milliseconds."""
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream(codec, 1000)
-        stream.width, stream.height = SMALL
-        stream.pix_fmt = pixels
-        stream.codec_context.max_b_frames = b_frames
-        stream.codec_context.gop_size = 8
-        for time, frame in zip(times, frames, strict=True):
-            picture = av.VideoFrame.from_ndarray(frame, "rgb24")
-            picture.pts = int(time)
-            container.mux(stream.encode(picture))
-        container.mux(stream.encode(None))
-    return path
-
-
 @pytest.mark.parametrize(
-    ("name", "codec", "pixels", "b_frames"),
+    ("name", "codec", "pixels", "options"),
     [
-        ("a.mkv", "ffv1", "bgr0", 0),
-        ("a.mp4", "mpeg4", "yuv420p", 2),
-        ("b.avi", "mpeg4", "yuv420p", 2),  # keeps no times
-        ("b.mp4", "libx264", "yuv420p", 3),
+        ("a.mkv", "ffv1", "bgr0", {}),
+        ("b.mp4", "libx264", "yuv420p", {"bf": "3", "g": "8"}),
     ],
 )
-def test_one_frame_is_that_of_all_whatever_the_times(tmp_path, name, codec, pixels, b_frames):
-    step = np.random.default_rng(0).integers(5, 60, 60)
-    times = np.cumsum(step) if name != "b.avi" else np.arange(60)
-    path = write_in_ms(tmp_path / name, times, drawn(60), codec, pixels, b_frames)
+def test_one_frame_is_that_of_all_whatever_the_times(tmp_path, name, codec, pixels, options):
+    times = np.cumsum(np.random.default_rng(0).integers(5, 60, 60)) / 1000
+    path = write_at(tmp_path / name, times, drawn(60), codec, pixels, **options)
     frames = list(read_video(path))
-    assert len(frames) >= 58
+    assert 58 <= len(frames) == video_info(path).frames
     for number in (0, 1, 7, 8, 9, 31, len(frames) - 1):
         assert np.array_equal(read_frame(path, number), frames[number])
     numbers = [0, 3, 4, 20, 21, 50]
@@ -349,31 +276,11 @@ def test_one_frame_is_that_of_all_whatever_the_times(tmp_path, name, codec, pixe
     assert all(np.array_equal(one, frames[k]) for one, k in zip(picked, numbers, strict=True))
 
 
-def test_no_file_has_so_many_frames(tmp_path):
-    path = write_video(tmp_path / "clip.mov", drawn(3))
-    for number in (3, 10**6, 2**63, 10**30):
-        with pytest.raises(ValueError, match=rf"number: .*must .*, got {number}"):
-            read_frame(path, number)
-
-
 @pytest.mark.parametrize(("name", "codec"), ALL)
-@pytest.mark.parametrize(
-    "fps", [np.float32(59.94), np.float64(1 / 3), Fraction(30000, 1001), 999.9]
-)
-def test_every_file_keeps_the_frame_rate(tmp_path, name, codec, fps):
-    path = write_video(tmp_path / name, [np.zeros((64, 64, 3), np.uint8)] * 4, fps, codec)
-    assert video_info(path).fps == pytest.approx(float(fps), rel=1e-4)
-    assert video_info(path).frames == 4
-
-
-# ------------------------------------------------------------------------------------- broken files
-
-
-@pytest.mark.parametrize(("name", "codec"), ALL)
-def test_a_file_that_is_cut_off_ends_there(tmp_path, name, codec):
+def test_a_file_that_is_cut_off_or_damaged_ends_there_or_is_refused(tmp_path, name, codec):
     path = write_video(tmp_path / name, drawn(), codec=codec)
     data, whole = path.read_bytes(), list(read_video(path))
-    for share in (0.02, 0.3, 0.6, 0.9, 0.999):
+    for share in (0.02, 0.6, 0.999):
         path.write_bytes(data[: int(share * len(data))])
         try:
             read = list(read_video(path))
@@ -381,29 +288,11 @@ def test_a_file_that_is_cut_off_ends_there(tmp_path, name, codec):
             continue
         assert len(read) <= 30
         assert all(np.array_equal(one, other) for one, other in zip(read[:-1], whole))  # noqa: B905
-
-
-@pytest.mark.parametrize(("name", "codec"), ALL)
-def test_damage_ends_a_file_or_is_refused(tmp_path, name, codec):
-    path = write_video(tmp_path / name, drawn(), codec=codec)
-    data = bytearray(path.read_bytes())
-    middle = len(data) // 2
-    data[middle : middle + 500] = np.random.default_rng(0).bytes(500)
-    path.write_bytes(data)
-    try:
-        count = len(list(read_video(path)))
-    except ValueError:
-        return
-    assert 0 < count <= 30
-
-
-def test_sound_is_no_video(tmp_path):
-    with wave.open(str(tmp_path / "sound.wav"), "wb") as sound:
-        sound.setparams((1, 2, 8000, 0, "NONE", ""))
-        sound.writeframes(bytes(8000))
-    for read in (read_video, video_info):
-        with pytest.raises(ValueError, match="path: must be a video file, got .* holds none"):
-            read(tmp_path / "sound.wav")
+    damaged = bytearray(data)
+    damaged[len(data) // 2 :][:500] = np.random.default_rng(0).bytes(500)
+    path.write_bytes(damaged)
+    with suppress(ValueError):
+        assert 0 < len(list(read_video(path))) <= 30
 
 
 def test_a_name_with_a_colon_is_no_protocol(tmp_path, monkeypatch):
@@ -411,9 +300,6 @@ def test_a_name_with_a_colon_is_no_protocol(tmp_path, monkeypatch):
     frames = drawn(2)
     write_video("12:30.mov", frames)
     assert all(np.array_equal(a, b) for a, b in zip(frames, read_video("12:30.mov"), strict=True))
-
-
-# ------------------------------------------------------------------------------ a disk that is full
 
 
 @pytest.fixture
@@ -425,11 +311,10 @@ def largest_file():
 
 
 @pytest.mark.parametrize(("name", "codec"), ALL)
-@pytest.mark.parametrize("left", [0.3, 0.99])
-def test_a_full_disk_is_an_error(tmp_path, largest_file, name, codec, left):
+def test_a_full_disk_is_an_error(tmp_path, largest_file, name, codec):
     frames = list(np.random.default_rng(0).integers(0, 256, (20, 64, 64, 3), np.uint8))
     size = write_video(tmp_path / f"whole_{name}", frames, codec=codec).stat().st_size
-    largest_file(int(left * size))
+    largest_file(int(0.99 * size))
     with pytest.raises(OSError, match="path: cannot write .* to '.*'"):
         write_video(tmp_path / name, frames, codec=codec)
     assert [p.name for p in tmp_path.iterdir()] == [f"whole_{name}"]
@@ -449,9 +334,6 @@ def test_frames_that_a_writer_loses_in_silence_are_an_error(tmp_path, monkeypatc
     with pytest.raises(OSError, match="cannot write 10 frames to .*, only 9 are in the file"):
         write_video(tmp_path / "clip.mov", drawn(10))
     assert list(tmp_path.iterdir()) == []
-
-
-# -------------------------------------------------------------------------- what is open, imported
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="counts open files in /proc")
@@ -481,9 +363,6 @@ def test_import_sets_no_variable_and_loads_no_heavy_library():
     assert ran.stdout == "[]\n"
 
 
-# ---- the clock of a file: even where it is, and right to a millisecond where it is not
-
-
 SIZE = (32, 24)
 
 
@@ -495,13 +374,12 @@ def clock_error(path, seconds):
     return np.abs(frame_clock(path) / video_info(path).fps - (seconds - seconds[0])).max()
 
 
-@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(
     ("name", "codec", "pixels"),
     [("a.mov", "qtrle", "rgb24"), ("a.mp4", "libx264", "yuv420p"), ("a.mkv", "ffv1", "bgr0")],
 )
-def test_the_clock_of_a_phone_is_right_to_a_millisecond(tmp_path, seed, name, codec, pixels):
-    seconds = waver(np.random.default_rng(seed), 90)
+def test_the_clock_of_a_phone_is_right_to_a_millisecond(tmp_path, name, codec, pixels):
+    seconds = waver(np.random.default_rng(0), 90)
     path = write_at(tmp_path / name, seconds, blank(len(seconds)), codec, pixels)
     assert len(frame_clock(path)) == len(list(read_video(path))) == len(seconds)
     assert clock_error(path, seconds) < 1e-3
@@ -519,23 +397,12 @@ def test_dropped_frames_are_gaps_of_an_even_clock(tmp_path, rate, name):
     assert clock_error(path, kept / rate) < 1e-3
 
 
-@pytest.mark.parametrize("fps", [29.97, 999.9, 1 / 3])
-@pytest.mark.parametrize(
-    ("name", "codec"),
-    [("a.mov", None), ("a.mkv", None), ("a.mp4", "mp4v"), ("a.avi", "MJPG"), ("a.avi", "FFV1")],
-)
+@pytest.mark.parametrize("fps", [np.float32(29.97), Fraction(30000, 1001), 999.9, 1 / 3])
+@pytest.mark.parametrize(("name", "codec"), ALL)
 def test_even_files_have_an_even_clock_though_their_times_are_rounded(tmp_path, fps, name, codec):
     path = write_video(tmp_path / name, blank(50), fps, codec)
     assert frame_clock(path).tolist() == list(range(50))
-    assert video_info(path).fps == pytest.approx(fps, rel=1e-4)
-
-
-@settings(max_examples=20, deadline=None)
-@given(st.lists(st.integers(1, 400), min_size=2, max_size=30))
-def test_any_times_are_kept(tmp_path_factory, steps):
-    seconds = np.cumsum(steps) / 400
-    path = write_at(tmp_path_factory.mktemp("any") / "a.mov", seconds, blank(len(steps)))
-    assert clock_error(path, seconds) < 1e-3
+    assert video_info(path)[:2] == (50, pytest.approx(float(fps), rel=1e-4))
 
 
 def test_the_start_that_an_editor_has_cut_off_does_not_count(tmp_path):
@@ -565,8 +432,8 @@ def test_the_start_that_an_editor_has_cut_off_does_not_count(tmp_path):
         ("a.mov", "prores_ks", "yuv422p10le"),
     ],
 )
-@pytest.mark.parametrize("size", [(96, 64), pytest.param((3840, 2160), marks=pytest.mark.slow)])
-def test_what_phones_code_is_read_in_eight_bits(tmp_path, name, codec, pixels, size):
+def test_what_phones_code_is_read_in_eight_bits(tmp_path, name, codec, pixels):
+    size = (96, 64)
     ramp = np.linspace(30, 220, size[0]).astype(np.uint8)
     frames = [np.tile(ramp[None, :, None], (size[1], 1, 3)) for _ in range(3)]
     quality = {"x265-params": "log-level=none:crf=10"} if codec == "libx265" else {}
@@ -578,46 +445,12 @@ def test_what_phones_code_is_read_in_eight_bits(tmp_path, name, codec, pixels, s
         assert np.abs(ours.astype(int) - true).mean() < 4
 
 
-@pytest.mark.parametrize(
-    ("name", "codec", "sound"),
-    [("a.avi", "mjpeg", False), ("a.webm", "libvpx", False), ("a.mkv", "ffv1", True)],
-)
-def test_half_a_file_is_told(tmp_path, name, codec, sound):
-    pixels = {"mjpeg": "yuvj420p", "ffv1": "bgr0"}.get(codec, "yuv420p")
-    with av.open(str(tmp_path / name), "w") as out:
-        stream = out.add_stream(codec, rate=30)
-        stream.width, stream.height, stream.pix_fmt = 80, 60, pixels
-        voice = out.add_stream("pcm_s16le", rate=8000, layout="mono") if sound else None
-        noise = np.random.default_rng(0).integers(0, 99, (60, 80, 3))
-        for k in range(60):
-            image = noise.copy()
-            image[20:30, 5 + k : 15 + k] = 230
-            frame = av.VideoFrame.from_ndarray(image.astype(np.uint8), format="rgb24")
-            out.mux(stream.encode(frame))
-            if voice:
-                heard = av.AudioFrame.from_ndarray(np.zeros((1, 267), np.int16), "s16", "mono")
-                heard.sample_rate, heard.pts = 8000, 267 * k
-                out.mux(voice.encode(heard))
-        out.mux(stream.encode())
-    whole = (tmp_path / name).read_bytes()
-    assert video_info(tmp_path / name).frames == 60
-    (tmp_path / name).write_bytes(whole[: len(whole) // 2])
-    assert video_info(tmp_path / name).frames == pytest.approx(60, abs=1)
-    told = track(tmp_path / name).warnings
-    assert any("frames can be read: it is cut off" in warning for warning in told)
-    with pytest.raises(ValueError, match="target: its frame must be one of .*, got 55"):
-        track(tmp_path / name, target=vl.Hint(frame=55, box=(55, 15, 20, 20)))
-
-
-# ---- frames of two instants: one of them is shown, whichever it is for all frames alike
-
-
 FIELDS = (160, 120)
 INTERLACED = {"x264-params": "interlaced=1:tff=1", "crf": "6"}
 
 
 def interlaced(path, track, **options):
-    """A interlaced with two views a frame: the upper lines of one, the lower of the next."""
+    """A film with two views a frame: the upper lines of one, the lower of the next."""
     views = list(render(track, Scene("plain", size=14, image_size=FIELDS)))
     frames = [view.copy() for view in views[::2]]
     for frame, later in zip(frames, views[1::2], strict=True):
@@ -629,27 +462,15 @@ def interlaced(path, track, **options):
 def test_the_target_is_where_it_was_at_one_instant(tmp_path):
     along = np.linspace(0, 2 * np.pi, 120)
     track = np.column_stack((80 + 45 * np.cos(along), 60 + 35 * np.sin(2 * along)))
-    found = vl.track(interlaced(tmp_path / "a.mp4", track, **INTERLACED)).pixels
+    path = interlaced(tmp_path / "a.mp4", track, **INTERLACED)
+    assert np.array_equal(read_frame(path, 19), list(read_video(path))[19])
+    found = vl.track(path).pixels
     seen = np.isfinite(found).all(axis=1)
     assert seen.mean() > 0.7
     assert np.sqrt(np.mean((found - track[::2])[seen] ** 2)) < 0.2
     # The same lines in a file that does not say so are half a frame late.
     mixed = vl.track(interlaced(tmp_path / "b.mp4", track, crf="6")).pixels
     assert np.nanmedian(np.abs(mixed - track[::2])) > np.nanmedian(np.abs(found - track[::2]))
-
-
-def test_every_reader_sees_the_same(tmp_path):
-    track = np.linspace([30, 30], [120, 90], 40)
-    path = interlaced(tmp_path / "a.mp4", track, **INTERLACED)
-    with av.open(str(path)) as container:
-        assert all(frame.interlaced_frame for frame in container.decode(video=0))
-    frames = list(vl.read_video(path))
-    assert frames[0].shape == (120, 160, 3)
-    for number in (0, 7, 19):
-        assert np.array_equal(vl.read_frame(path, number), frames[number])
-
-
-# ---- films that are folders of images
 
 
 def fill(folder, names, size=(32, 24)):
@@ -664,7 +485,7 @@ def shades(path):
     return [int(frame[0, 0, 0]) for frame in vl.read_video(path)]
 
 
-@pytest.mark.parametrize("place", ["shots", "弾む球", "it's $5"])
+@pytest.mark.parametrize("place", ["弾む球", "it's $5"])
 def test_a_folder_is_a_film_in_the_order_of_its_numbers(tmp_path, place):
     folder = fill(tmp_path / place, [f"f{i}.png" for i in range(1, 13)])
     (folder / "notes.txt").write_text("no image")
@@ -677,21 +498,21 @@ def test_a_folder_is_a_film_in_the_order_of_its_numbers(tmp_path, place):
         vl.read_frame(folder, 12)
 
 
-@pytest.mark.parametrize("pattern", ["a_%04d.png", "a_%d.png", "a_*.png", "a_????.png"])
+@pytest.mark.parametrize("pattern", ["a_%04d.png", "a_%d.png", "a_????.png"])
 def test_a_pattern_leaves_the_others_aside(tmp_path, pattern):
     fill(tmp_path / "shots", [f"b_{i:04d}.png" for i in range(3)])
     fill(tmp_path / "shots", [f"a_{i:04d}.png" for i in range(7)])
     assert shades(tmp_path / "shots" / pattern) == [10 * i for i in range(7)]
+    path = tmp_path / "none" / pattern
+    said = re.escape(f"nor images of that name, got '{path}'")
+    with pytest.raises(FileNotFoundError, match=said):
+        vl.read_video(path)
 
 
-def test_a_missing_image_is_a_dropped_frame(tmp_path):
+def test_a_missing_image_is_a_dropped_frame_and_letters_are_in_their_order(tmp_path):
     folder = fill(tmp_path / "shots", [f"{i:03d}.png" for i in (100, 110, 130, 140, 150)])
     assert frame_clock(folder).tolist() == [0, 1, 3, 4, 5]
-
-
-def test_names_without_numbers_are_in_the_order_of_letters(tmp_path):
-    folder = fill(tmp_path / "shots", ["a.png", "b.png", "c.png"])
-    assert shades(folder) == [0, 10, 20]
+    assert shades(fill(tmp_path / "letters", ["a.png", "b.png", "c.png"])) == [0, 10, 20]
 
 
 @pytest.mark.parametrize(
@@ -710,14 +531,6 @@ def test_folders_that_are_no_film(tmp_path, names, message):
             read(folder)
 
 
-def test_a_pattern_that_nothing_fits(tmp_path):
-    path = tmp_path / "none" / "a_%04d.png"
-    with pytest.raises(
-        FileNotFoundError, match=re.escape(f"nor images of that name, got '{path}'")
-    ):
-        vl.read_video(path)
-
-
 def test_images_that_cannot_be_read(tmp_path):
     folder = fill(tmp_path / "shots", ["1.png", "2.png", "3.png"])
     (folder / "2.png").write_bytes(b"")
@@ -726,16 +539,9 @@ def test_images_that_cannot_be_read(tmp_path):
     fill(folder, ["2.png"], size=(8, 8))
     with pytest.raises(ValueError, match=r"one size, \(32, 24\), got \(8, 8\) in .*2\.png"):
         shades(folder)
-
-
-def test_a_folder_is_tracked_as_the_video_is(tmp_path):
-    track = np.linspace([40, 40], [200, 160], 40)
-    scene = vl.Scene(background="sky", size=14, image_size=(256, 200))
-    video = vl.render_video(tmp_path / "a.mov", track, scene)
-    (tmp_path / "a").mkdir()
-    for i, frame in enumerate(vl.read_video(video)):
-        cv2.imwrite(str(tmp_path / "a" / f"{i:05d}.png"), frame[..., ::-1])
-    np.testing.assert_array_equal(vl.track(tmp_path / "a").pixels, vl.track(video).pixels)
+    cv2.imwritemulti(str(tmp_path / "a.tif"), [np.zeros((9, 9), np.float32)] * 3)
+    with pytest.raises(ValueError, match="path: must be an image that OpenCV can read"):
+        video_info(tmp_path / "a.tif")
 
 
 def pages(dtype, shift=0):
@@ -748,9 +554,10 @@ def pages(dtype, shift=0):
         yield page.astype(dtype) << shift
 
 
-@pytest.mark.parametrize("name", ["film.tif", "弾む.TIFF"])
-def test_pages_of_one_tiff_are_a_film(tmp_path, name):
-    cv2.imwritemulti(str(tmp_path / "a.tif"), list(pages(np.uint8)))
+@pytest.mark.parametrize(("name", "bits"), [("film.tif", 8), ("弾む.TIFF", 10), ("a.tif", 16)])
+def test_pages_of_one_tiff_are_a_film_of_as_many_bits_as_it_uses(tmp_path, name, bits):
+    dtype = np.uint8 if bits == 8 else np.uint16
+    cv2.imwritemulti(str(tmp_path / "a.tif"), list(pages(dtype, bits - 8)))
     path = (tmp_path / "a.tif").rename(tmp_path / name)
     assert video_info(path)[::2] == (40, (80, 60))
     film = [page[..., 0] for page in vl.read_video(path)]
@@ -761,84 +568,31 @@ def test_pages_of_one_tiff_are_a_film(tmp_path, name):
         video_info(tmp_path / "bad.tif")
 
 
-@pytest.mark.parametrize("bits", [10, 12, 16])
-def test_images_of_fewer_bits_than_they_have_room_for(tmp_path, bits):
-    (tmp_path / "film").mkdir()
-    for k, page in enumerate(pages(np.uint16, bits - 8)):
-        cv2.imwrite(str(tmp_path / "film" / f"{k:03d}.png"), page)
-    film = [page[..., 0] for page in vl.read_video(tmp_path / "film")]
-    np.testing.assert_array_equal(film, list(pages(np.uint8)))
-
-
-def test_one_image_is_no_film(tmp_path):
-    (tmp_path / "one").mkdir()
-    cv2.imwrite(str(tmp_path / "one" / "1.png"), np.zeros((10, 10, 3), np.uint8))
-    with pytest.raises(ValueError, match="path: must hold two frames or more, got one in"):
-        vl.track(tmp_path / "one")
-
-
-def test_images_of_real_numbers_are_refused(tmp_path):
-    cv2.imwritemulti(str(tmp_path / "a.tif"), [np.zeros((9, 9), np.float32)] * 3)
-    with pytest.raises(ValueError, match="path: must be an image that OpenCV can read"):
-        video_info(tmp_path / "a.tif")
-
-
-# ---- frames that are looked at several times against those of the file
-
-
-def rounded(factor):
-    """By how much a mean may be off: each step, a halving or the rest, rounds to whole levels."""
-    return 0.51 * {2: 1, 3: 1, 4: 2, 6: 2, 8: 3}[factor]
-
-
 @pytest.mark.parametrize("factor", [2, 3, 4, 6, 8])
-def test_reduced_pixels_are_means(factor):
-    image = np.random.default_rng(0).integers(0, 256, (4 * factor, 6 * factor, 3), np.uint8)
-    means = image.reshape(4, factor, 6, factor, 3).mean(axis=(1, 3))
-    np.testing.assert_allclose(reduce(image, factor), means, atol=rounded(factor))
-    assert reduce(image, factor).shape == (4, 6, 3)
+def test_reduced_pixels_are_means_the_last_row_and_column_repeated(factor):
+    image = np.random.default_rng(0).integers(0, 256, (25, 49, 3), np.uint8)
+    cut = np.pad(image, ((0, -25 % factor), (0, -49 % factor), (0, 0)), mode="edge")
+    means = cut.reshape(len(cut) // factor, factor, -1, factor, 3).mean(axis=(1, 3))
+    # Each step, a halving or the rest, rounds to whole levels.
+    steps = {2: 1, 3: 1, 4: 2, 6: 2, 8: 3}[factor]
+    np.testing.assert_allclose(reduce(image, factor), means, atol=0.51 * steps)
     assert reduce(image, 1) is image
 
 
-@pytest.mark.parametrize("factor", [3, 4])
-def test_what_is_missing_of_the_last_squares_repeats_the_last_row_and_column(factor):
-    image = np.random.default_rng(0).integers(0, 256, (7, 10, 3), np.uint8)
-    cut = np.pad(image, ((0, -7 % factor), (0, -10 % factor), (0, 0)), mode="edge")
-    means = cut.reshape(len(cut) // factor, factor, -1, factor, 3).mean(axis=(1, 3))
-    np.testing.assert_allclose(reduce(image, factor), means, atol=rounded(factor))
-
-
 @pytest.mark.parametrize("longest", [None, 16])
-@pytest.mark.parametrize(("room", "reads", "picks"), [(1.0, 1, 0), (0.99, 2, 1)])
-def test_frames_are_read_once_if_there_is_room(tmp_path, monkeypatch, room, reads, picks, longest):
+@pytest.mark.parametrize(("room", "reads"), [(1.0, 1), (0.99, 2)])
+def test_frames_are_read_once_if_there_is_room(tmp_path, monkeypatch, room, reads, longest):
     images = np.random.default_rng(0).integers(0, 256, (5, 16, 32, 3), np.uint8)
-    path = write_video(tmp_path / "clip.mov", iter(images))
-    count = {"read_video": 0, "pick_frames": 0}
-
-    def counted(name):
-        use = getattr(video, name)
-
-        def one(*given):
-            count[name] += 1
-            return use(*given)
-
-        monkeypatch.setattr(video, name, one)
-
-    counted("read_video")
-    counted("pick_frames")
-    reel = Reel(path, longest)
+    reel = Reel(write_video(tmp_path / "clip.mov", iter(images)), longest)
     small = np.array([reduce(image, reel.factor) for image in images])
+    next(iter(reel))  # of which not all was seen
+    np.testing.assert_array_equal(list(reel), small)
     monkeypatch.setattr(video, "_ROOM", room * small.nbytes)
-    reel = Reel(path, longest)
+    opened = []
+    monkeypatch.setattr(video, "read_video", lambda *given: opened.append(1) or read_video(*given))
+    reel = Reel(reel.path, longest)
     assert reel.whole.few == (longest is None and room == 1)
     np.testing.assert_array_equal(list(reel.pick([0, 2, 4, 7])), small[[0, 2, 4]])
     for _ in range(2):
         np.testing.assert_array_equal(list(reel), small)
-    assert count == {"read_video": reads, "pick_frames": picks}
-
-
-def test_a_film_of_which_not_all_was_seen_is_read_again(tmp_path):
-    images = np.random.default_rng(0).integers(0, 256, (5, 16, 32, 3), np.uint8)
-    reel = Reel(write_video(tmp_path / "clip.mov", iter(images)))
-    next(iter(reel))
-    np.testing.assert_array_equal(list(reel), images)
+    assert len(opened) == reads
