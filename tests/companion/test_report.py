@@ -1,8 +1,11 @@
 """The report: complete, readable without network, and whole or not there."""
 
 import json
+import os
 import re
 import shutil
+import subprocess
+import sys
 import warnings
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -178,6 +181,19 @@ def test_a_full_disk_leaves_what_was_there(case, old, tmp_path, undrawn, monkeyp
                 write_report(case[0], None, folder)
     assert_old(old)
     assert not (tmp_path / "new").exists()
+
+
+def test_what_a_killed_run_has_left_is_cleared_by_the_next(case, old, undrawn):
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    for name in FILES:
+        (old / f".{name}.{gone.pid}").write_text("left")
+        (old / f".{name}.{os.getppid()}").write_text("of a run that goes on")
+    (old / "report.html").unlink()
+    (old / "result.json").write_text('{\n "format": 1')
+    write_report(case[0], None, old)
+    hidden = {f".{name}.{os.getppid()}" for name in FILES}
+    assert {path.name for path in old.iterdir()} == {*FILES, *hidden, "thesis.tex"}
 
 
 def test_other_peoples_files_are_not_overwritten(tmp_path):

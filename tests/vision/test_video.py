@@ -295,6 +295,20 @@ def test_a_file_that_is_cut_off_or_damaged_ends_there_or_is_refused(tmp_path, na
         assert 0 < len(list(read_video(path))) <= 30
 
 
+def test_frames_are_counted_where_the_header_states_no_number(tmp_path):
+    rng = np.random.default_rng(0)
+    path, cut = tmp_path / "clip.mkv", tmp_path / "cut.mkv"
+    fourcc = cv2.VideoWriter_fourcc(*"FFV1")
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, fourcc, 25, SMALL)
+    for _ in range(200):
+        writer.write(rng.integers(0, 256, (*SMALL[::-1], 3), np.uint8))
+    cut.write_bytes(path.read_bytes())  # before the length is written into the header
+    writer.release()
+    assert video_info(path).frames == 200
+    assert 0 < video_info(cut).frames < 200
+    assert video_info(cut).frames == len(list(read_video(cut)))
+
+
 def test_a_name_with_a_colon_is_no_protocol(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     frames = drawn(2)
