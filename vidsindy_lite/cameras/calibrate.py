@@ -502,5 +502,6 @@ def _step(track: Floats) -> float:
     places = np.unique(seen - seen.min(axis=0, initial=np.inf))
     if len(places) < 4:  # of which nothing can be said
         return 0.0
-    steps = places / np.diff(places).min()
-    return float(places[1] / steps[1]) if np.allclose(steps, np.round(steps), atol=1e-6) else 0.0
+    step = float(np.diff(places).min())
+    off = places / step - np.round(places / step)
+    return step if np.abs(off).max() < 1e-6 else 0.0
