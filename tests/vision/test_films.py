@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import Hint, track, write_video
+from vidsindy_lite.vision import track_targets
 from vidsindy_lite.vision.rendering import BACKGROUNDS
 
 N = 80
@@ -303,3 +304,28 @@ def test_a_ball_of_two_halves_that_turns(tmp_path, colours, rate, flicker):
     error = np.linalg.norm(track(path).pixels - around_bricks(), axis=1)
     assert np.isfinite(error).mean() > 0.8
     assert np.nanpercentile(error, 90) < 1
+
+
+# ---- where what is seen is more than the target, or less, it is left out, mended or told
+
+
+@pytest.mark.parametrize("apart", [13, 40])
+def test_two_equal_balls_side_by_side_are_never_one(tmp_path, apart):
+    middle = np.column_stack([160 + 90 * np.sin(ANGLE), 90 + 20 * np.sin(2 * ANGLE)])
+    off = apart / 2 + 12 * np.maximum(np.abs(np.arange(N) - N / 2) / 10 - 1.5, 0)
+    truth = [middle + off[:, None] * side for side in np.array([[0.6, 0.8], [-0.6, -0.8]])]
+    rng = np.random.default_rng(7)
+    back = texture(rng, 320, 180)
+
+    def frames():
+        for places_ in zip(*truth, strict=True):
+            image = back.copy()
+            for place in places_:
+                disc(image, place, 8, (30, 30, 220))
+            yield np.clip(image + rng.normal(0, 2, image.shape), 0, 255).astype(np.uint8)
+
+    tracks = track_targets(write_video(tmp_path / "two.mov", frames()), 2)
+    for found in tracks:
+        error = np.min([np.linalg.norm(found.pixels - one, axis=1) for one in truth], axis=0)
+        assert np.isfinite(error).mean() > (0.9 if apart > 20 else 0.4)
+        assert np.nanmax(error) < 1.5

@@ -18,7 +18,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from ..arrays import Floats, Floats32, Image, Ints
+from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .background import sampled
 from .camera import LOOSE, camera_motion
 from .candidates import (
@@ -390,8 +390,14 @@ def expected(seen: Candidates, rows: Ints, film: Film, n: int) -> Ways:
     return Ways(k * centre + (k - 1) / 2, k * box, colour)
 
 
-def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, ...]) -> Track:
-    """The views of the whole target as a track."""
+def finished(
+    views: list[View | None], motion: CameraMotion, doubts: tuple[str, ...],
+    apart: Bools | None = None,
+) -> Track:  # fmt: skip
+    """The views of the whole target as a track.
+
+    Where (n,) it is not known to be `apart` from others like it, a view may be of several in one.
+    """
     n = len(views)
     pixels, errors = np.full((n, 2), np.nan), np.full(n, np.inf)
     whole, of_parts = entire(views)
@@ -405,6 +411,8 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
     inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])
     outlines = [carry(motion.maps[i], view.outline) for i, view in zip(at, shown, strict=True)]
     alone = np.array([view.whole is not None and view.whole.area == view.area for view in shown])
+    if apart is not None:
+        alone &= apart[at]
     inside &= ~hidden(outlines, steady, areas, alone)
     faint = np.array([view.faint for view in shown])
     if faint.mean() < 0.5:  # else it is so everywhere
