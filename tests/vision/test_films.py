@@ -5,6 +5,9 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import Hint, track, write_video
+from vidsindy_lite.vision import Track, track_targets
+from vidsindy_lite.vision.moving import unsure
+from vidsindy_lite.vision.refining import roughness
 from vidsindy_lite.vision.rendering import BACKGROUNDS
 
 N = 80
@@ -233,3 +236,75 @@ def test_a_ball_of_two_halves_that_turns(tmp_path, colours, rate, flicker):
     error = np.linalg.norm(track(path).pixels - places(), axis=1)
     assert np.isfinite(error).mean() > 0.8
     assert np.nanpercentile(error, 90) < 1
+
+
+# ---- where what is seen is more than the target, or less, it is left out, mended or told
+
+
+def test_what_goes_on_beyond_the_window_is_not_the_whole_target(tmp_path):
+    rng = np.random.default_rng(5)
+    wheel = texture(rng, 240, 200)[..., ::-1]
+
+    def draw(image, i):
+        turn = cv2.getRotationMatrix2D((120, 100), np.degrees(ANGLE[i]), 1)
+        turned = cv2.warpAffine(wheel, turn, (240, 200), borderMode=cv2.BORDER_REFLECT)
+        mask = np.zeros(image.shape[:2], np.uint8)
+        cv2.circle(mask, (120, 100), 90, 1, -1)
+        image[mask > 0] = turned[mask > 0]
+        disc(image, ROUND[i], 8, (40, 230, 110))
+        return image
+
+    _, error = followed(tmp_path, 5, (240, 200), ROUND, draw, around(ROUND, 18))
+    assert np.nanpercentile(error, 95) < 1.5
+
+
+def test_a_target_that_is_half_in_the_shade_is_the_whole_of_it(tmp_path):
+    sway = np.column_stack([80 + 40 * np.sin(ANGLE / 2), 90 + 40 * np.sin(ANGLE)])
+    light = 1 - 0.5 / (1 + np.exp((np.arange(320) - 115) / 2))
+
+    def draw(image, i):
+        disc(image, sway[i], 22, (220, 120, 170))
+        return image * light[None, :, None]
+
+    _, error = followed(tmp_path, 6, (320, 180), sway, draw)
+    assert np.nanpercentile(error, 95) < 1.5
+
+
+@pytest.mark.parametrize("apart", [13, 40])
+def test_two_equal_balls_side_by_side_are_never_one(tmp_path, apart):
+    middle = np.column_stack([160 + 90 * np.sin(ANGLE), 90 + 20 * np.sin(2 * ANGLE)])
+    off = apart / 2 + 12 * np.maximum(np.abs(np.arange(N) - N / 2) / 10 - 1.5, 0)
+    truth = [middle + off[:, None] * side for side in np.array([[0.6, 0.8], [-0.6, -0.8]])]
+    rng = np.random.default_rng(7)
+    back = texture(rng, 320, 180)
+
+    def frames():
+        for places_ in zip(*truth, strict=True):
+            image = back.copy()
+            for place in places_:
+                disc(image, place, 8, (30, 30, 220))
+            yield np.clip(image + rng.normal(0, 2, image.shape), 0, 255).astype(np.uint8)
+
+    tracks = track_targets(write_video(tmp_path / "two.mov", frames()), 2)
+    for found in tracks:
+        error = np.min([np.linalg.norm(found.pixels - one, axis=1) for one in truth], axis=0)
+        assert np.isfinite(error).mean() > (0.9 if apart > 20 else 0.4)
+        assert np.nanmax(error) < 1.5
+
+
+def test_a_view_of_another_size_or_off_the_way_is_known_less_well():
+    at = np.arange(40)
+    places = np.column_stack([3.0 * at, 0.02 * at**2])
+    areas = np.full(40, 400.0)
+    areas[10], places[30] = 300, places[30] + 3
+    off, _ = roughness(at, places, areas)
+    assert off[10] > 2
+    assert off[30] > 2
+    assert (np.delete(off, [10, *range(27, 34)]) < 0.5).all()
+
+
+@pytest.mark.parametrize("part", [4, 12])
+def test_many_frames_that_show_only_a_part_are_told(part):
+    confidence = np.where(np.arange(40) < part, 0.5, 0.9)
+    told = unsure(Track(np.zeros((40, 2)), confidence, "motion"))
+    assert any("only a part of the target" in doubt for doubt in told) == (part > 8)

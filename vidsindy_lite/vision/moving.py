@@ -18,7 +18,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from ..arrays import Floats, Floats32, Image, Ints
+from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .background import sampled
 from .camera import LOOSE, camera_motion
 from .candidates import (
@@ -34,7 +34,7 @@ from .candidates import (
 )
 from .hints import Hint
 from .plate import Plate, lights_of, noise_of
-from .refining import Lens, View, entire, fitting, hidden, scatter, swapped
+from .refining import Lens, View, entire, fitting, hidden, roughness, swapped
 from .steadying import CameraMotion, at_rest, carry, rescaled
 from .video import Reel, reduce
 
@@ -174,7 +174,21 @@ def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
         colour = np.median([view.colour for view in views if view], axis=0)
         doubts += hint.unlike(colour)
     found = finished(views, film.motion, doubts)
-    return _filled(found, film, views, looks, ways, seed)
+    found = _filled(found, film, views, looks, ways, seed)
+    return replace(found, warnings=found.warnings + unsure(found))
+
+
+def unsure(found: Track) -> tuple[str, ...]:
+    """Is a place in many of the frames of a track known to a pixel or two only?"""
+    seen = np.isfinite(found.pixels[:, 0])
+    vague = np.flatnonzero(seen & (found.confidence < np.exp(-1.5 * LOOSE / 3)))
+    if found.warnings or len(vague) < 0.2 * seen.sum():
+        return ()
+    middle = vague[len(vague) // 2]
+    return (
+        f"in {len(vague)} of {seen.sum()} frames, e.g. {middle}, only a part of the target is told "
+        "from what is around it: it may be some pixels off there",
+    )
 
 
 def sighted(
@@ -390,8 +404,14 @@ def expected(seen: Candidates, rows: Ints, film: Film, n: int) -> Ways:
     return Ways(k * centre + (k - 1) / 2, k * box, colour)
 
 
-def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, ...]) -> Track:
-    """The views of the whole target as a track."""
+def finished(
+    views: list[View | None], motion: CameraMotion, doubts: tuple[str, ...],
+    apart: Bools | None = None,
+) -> Track:  # fmt: skip
+    """The views of the whole target as a track.
+
+    Where (n,) it is not known to be `apart` from others like it, a view may be of several in one.
+    """
     n = len(views)
     pixels, errors = np.full((n, 2), np.nan), np.full(n, np.inf)
     whole, of_parts = entire(views)
@@ -405,6 +425,8 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
     inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])
     outlines = [carry(motion.maps[i], view.outline) for i, view in zip(at, shown, strict=True)]
     alone = np.array([view.whole is not None and view.whole.area == view.area for view in shown])
+    if apart is not None:
+        alone &= apart[at]
     inside &= ~hidden(outlines, steady, areas, alone)
     faint = np.array([view.faint for view in shown])
     if faint.mean() < 0.5:  # else it is so everywhere
@@ -420,12 +442,9 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
         doubts += (f"from frame {at[good][first]} on, what is followed has another size at once: "
                    "perhaps it is something else",)  # fmt: skip
     pixels[at[good]] = steady[good]
-    # What is missing of a view is missing on one side of it.
-    side = np.sqrt(np.median(areas[good]))
-    torn = scatter(at[good], np.log(np.maximum(areas[good], 1))[:, None]) * side / 2
-    rough = np.hypot(scatter(at[good], steady[good]), torn if np.isfinite(torn) else 0.0)
+    rough, torn = roughness(at[good], steady[good], areas[good])
     errors[at[good]] = np.hypot(rough, motion.errors[at[good]])
-    if np.isfinite(torn) and torn > max(LOOSE, 0.02 * side):
+    if np.isfinite(torn) and torn > max(LOOSE, 0.02 * np.sqrt(np.median(areas[good]))):
         doubts += (f"the outline of the target changes from frame to frame: its place is known to "
                    f"{torn:.1f} px only",)  # fmt: skip
     if np.median(motion.errors[at[good]]) > LOOSE:
@@ -464,11 +483,16 @@ def _filled(
         size, view = ways.box[i, 2:].mean(), views[i]
         beside = np.concatenate([at[at < i][-4:], at[at > i][:4]])
         if len(beside) == 8 and np.ptp(beside) < 40:
-            way, other = (np.polyfit(beside - i, pixels[beside], degree)[-1] for degree in (3, 2))
-            known = np.linalg.norm(way - other) < (0.25 * size if told else min(0.25 * size, 2))
+            # What a cubic misses where the motion turns a quartic shows.
+            other, way, finer = (
+                np.polyfit(beside - i, pixels[beside], degree)[-1] for degree in (2, 3, 4)
+            )
+            off = max(np.linalg.norm(way - other), np.linalg.norm(finer - other))
+            known = off < (0.25 * size if told else min(0.25 * size, 2))
             there = carry(film.motion.maps[i], view.centroid[None])[0] if view else np.inf
             part = np.linalg.norm(there - way) < 0.75 * size
-            if known and (part or (on[i] and looks.fit[i] > 0.5 * usual)):
+            like = np.linalg.norm(alike[i] - way) < 0.6 * side[i] + 2
+            if known and (part or (like and looks.fit[i] > 0.5 * usual)):
                 pixels[i], confidence[i] = way, rough
                 continue
         if not told and view is not None:  # what hides a part of it draws its looks aside

@@ -29,6 +29,7 @@ _REACH = 1.5  # sides of the target from its middle that its usual outline may h
 _UNEVEN = 0.12  # share by which a shadow may darken the colours of a pixel unlike each other
 _WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
 _AROUND = 9  # views around one that say how large it should be
+_LONG = 31  # views around one that say how large it usually is
 _MOSTLY = 0.8  # share of the views that must show it whole
 _JOINED = 2.0  # factor by which the area grows at once where a target meets something like it
 _BESIDE = 5  # views before and after such a meeting, which show how large it was and is
@@ -181,6 +182,9 @@ class Lens:
         label, colours, plain = found
         if plain:
             return replace(view, whole=view) if part else None
+        first, end = _extent(label, low)
+        if (((first == low) & (low > 0)) | ((end == high) & (high < self.plate.size))).any():
+            return view if part else None  # how far it goes, the window does not show
         all_ = self._measure(label, change, colours - ground, low, bound, now)
         return replace(view if part else replace(all_, area=0.0), whole=all_)
 
@@ -201,16 +205,20 @@ class Lens:
         area = float(alpha.sum())
         u, v = np.arange(alpha.shape[1]), np.arange(alpha.shape[0])
         centroid = np.array([alpha.sum(axis=0) @ u, alpha.sum(axis=1) @ v]) / max(area, 1e-9)
-        rows, columns = np.flatnonzero(label.any(axis=1)), np.flatnonzero(label.any(axis=0))
-        first = low + [columns[0], rows[0]]
-        last = low + [columns[-1], rows[-1]]
-        inside = bool((first > 0).all() and (last < self.plate.size - 1).all())
+        first, end = _extent(label, low)
+        inside = bool((first > 0).all() and (end < self.plate.size).all())
         # Nearly all of the ground around it differs from it by less than two tolerances.
         alike = square[rim] < (2 * bound[rim]) ** 2
         faint = bool(alike.any() and alike.mean() > 0.9)
         shade = now[core if core.any() else label].mean(axis=0)
         outline = low + hull(label).astype(float)
         return View(low + centroid, area, shade, inside, outline, faint=faint)
+
+
+def _extent(label: Bools, low: Floats) -> tuple[Floats, Floats]:
+    """The first pixel of a mask and the one after its last, in an image where it begins at low."""
+    left, top, width, height = cv2.boundingRect(label.astype(np.uint8))
+    return low + [left, top], low + [left + width, top + height]
 
 
 def _nearest(mask: Bools, centre: Floats) -> Bools | None:
@@ -237,7 +245,7 @@ def entire(views: Sequence[View | None]) -> tuple[list[View | None], tuple[str, 
     views : sequence of View or None
         By the target's colour, one a frame.
     """
-    parts = [one if one is not None and one.area > 0 else None for one in views]
+    parts = _usual_ones(views)
     both = [(one, one.whole) for one in views if one is not None and one.whole is not None]
     areas = np.array([[one.area, all_.area] for one, all_ in both]).reshape(-1, 2)
     offset = np.array([one.centroid - all_.centroid for one, all_ in both]).reshape(-1, 2)
@@ -257,6 +265,25 @@ def entire(views: Sequence[View | None]) -> tuple[list[View | None], tuple[str, 
         return [one and (one.whole or one) for one in views], ()
     return parts, ("the target has several colours, or touches other things: perhaps only a part "
                    "of it is followed",)  # fmt: skip
+
+
+def _usual_ones(views: Sequence[View | None]) -> list[View | None]:
+    """Of each view by the target's colour and that of the whole, the one of the usual size.
+
+    Where the light on the target changes, as at a shadow's edge, its colour is that of a part only.
+    """
+    areas = np.array([(one.area, one.whole.area if one.whole else 0.0) if one else (0.0, 0.0)
+                      for one in views]).reshape(-1, 2)  # fmt: skip
+    shown = np.flatnonzero(areas[:, 0] > 0)
+    if not len(shown):
+        return [None] * len(views)
+    usual = np.interp(np.arange(len(views)), shown, median_filter(areas[shown, 0], _LONG))
+    off = np.abs(np.log(np.maximum(areas, 1e-3) / usual[:, None]))
+    # Areas of whole views scatter by less.
+    better = off[:, 1] < np.minimum(off[:, 0], np.log(1.15))
+    best = [replace(one.whole, whole=one.whole) if one and one.whole and fits else one
+            for one, fits in zip(views, better, strict=True)]  # fmt: skip
+    return [one if one and one.area > 0 else None for one in best]
 
 
 def fitting(
@@ -331,7 +358,9 @@ def swapped(frames: Ints, areas: Floats) -> int | None:
     return None
 
 
-def _leave_out(frames: Floats, places: Floats, i: int, witnesses: Ints) -> tuple[float, float]:
+def _leave_out(
+    frames: Floats | Ints, places: Floats, i: int, witnesses: Ints
+) -> tuple[float, float]:
     """How far a place is from where the three on both sides of it say, and how unsure that is.
 
     A quartic through these says it. Where a target turns within a few frames, or some of them are
@@ -350,6 +379,22 @@ def _leave_out(frames: Floats, places: Floats, i: int, witnesses: Ints) -> tuple
     off, unsure = np.linalg.norm([quartic - places[i], quartic - parabola], axis=1)
     beyond = t.min() > 0 or t.max() < 0
     return float(off), float(unsure * (1 + beyond))
+
+
+def roughness(frames: Ints, places: Floats, areas: Floats) -> tuple[Floats, float]:
+    """How far each of the views (n,) may be off its place, and how far as a rule by its outline.
+
+    By as much as the way is rough, or as it is off the way of those around it. And what is missing
+    of a view, or more than the target, is so on one side of it: by half its share.
+    """
+    half, logs = np.sqrt(np.median(areas)) / 2, np.log(np.maximum(areas, 1))
+    torn = half * scatter(frames, logs[:, None])
+    odd = half * np.abs(logs - median_filter(logs, _AROUND, mode="nearest"))
+    every = np.arange(len(frames))
+    told = [_leave_out(frames, places, i, every) for i in range(len(frames))]
+    off, unsure = np.array(told).T
+    worst = np.maximum(np.maximum(odd, off - unsure), torn if np.isfinite(torn) else 0.0)
+    return np.hypot(scatter(frames, places), worst), torn
 
 
 def scatter(frames: Ints, places: Floats) -> float:

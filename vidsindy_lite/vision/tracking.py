@@ -268,12 +268,17 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
     lanes, strange = _lanes(seen, paths, count)
     ways = [_joined([expected(seen, p.rows, film, n) for p in lane]) for lane in lanes]
     touching = _touching(ways)
+    # One that is not seen may be in one with any of the others.
+    lost = np.ones((len(lanes), n), bool)
+    for missed, lane in zip(lost, lanes, strict=True):
+        missed[seen.frame[np.concatenate([path.rows for path in lane])]] = False
     doubts = _doubts(seen, strange, film.factor, n, Path(path).name)
     tracks = []
     lens = lens_of(samples, film, *ways)
-    for way, hidden in zip(ways, touching, strict=True):
+    for way, hidden, missed in zip(ways, touching, lost, strict=True):
+        apart = np.asarray(lost.sum(axis=0) == missed)
         way.centre[hidden] = np.nan
-        tracks.append(finished(viewed(film, lens, way, lights), film.motion, doubts))
+        tracks.append(finished(viewed(film, lens, way, lights), film.motion, doubts, apart))
         doubts = ()
     return (*tracks, *[nothing(film.motion, n)] * (count - len(tracks)))
 
