@@ -181,7 +181,7 @@ def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
 def unsure(found: Track) -> tuple[str, ...]:
     """Is a place in many of the frames of a track known to a pixel or two only?"""
     seen = np.isfinite(found.pixels[:, 0])
-    vague = np.flatnonzero(seen & (found.confidence < np.exp(-1.5 * LOOSE / 3)))
+    vague = np.flatnonzero(seen & (found.confidence < _confidence(1.5 * LOOSE)))
     if found.warnings or len(vague) < 0.2 * seen.sum():
         return ()
     middle = vague[len(vague) // 2]
@@ -363,9 +363,13 @@ def _as_track(
     pixels: Floats, errors: Floats, motion: CameraMotion, doubts: tuple[str, ...]
 ) -> Track:
     """Of pixels (n, 2) of the first frame and their errors (n,), infinite where it is not seen."""
-    confidence = np.exp(-errors / 3)
     maps = motion.maps[: len(pixels)] if motion.moves else None
-    return Track(pixels, confidence, "motion", doubts, maps)
+    return Track(pixels, _confidence(errors), "motion", doubts, maps)
+
+
+def _confidence(errors: Floats | float) -> Floats:
+    """In places that are known to so many pixels: 1 if exactly, 0 if not at all."""
+    return np.asarray(np.exp(-np.asarray(errors) / 3))
 
 
 def _doubts(film: Film, seen: Candidates, paths: list[Path], hint: Hint | None) -> tuple[str, ...]:
@@ -467,9 +471,10 @@ def _filled(
     rough = 0.5  # confidence in a target that is not seen whole: it is known to about two pixels
     alike = carry(film.motion.maps[:n], k * looks.box[:, :2] + (k - 1) / 2)
     side = k * np.sqrt(looks.box[:, 2:].prod(axis=1))
+    reach = 0.6 * side + 2
     expects = carry(film.motion.maps[:n], ways.centre)
     with np.errstate(invalid="ignore"):
-        on = np.linalg.norm(alike - expects, axis=1) < 0.6 * side + 2
+        on = np.linalg.norm(alike - expects, axis=1) < reach
     if seed is not None:  # of what somebody points at, no view is of something else
         stray = np.linalg.norm(pixels - alike, axis=1) > 0.5 * side + 2
         pixels[stray], confidence[stray] = np.nan, 0
@@ -491,7 +496,7 @@ def _filled(
             known = off < (0.25 * size if told else min(0.25 * size, 2))
             there = carry(film.motion.maps[i], view.centroid[None])[0] if view else np.inf
             part = np.linalg.norm(there - way) < 0.75 * size
-            like = np.linalg.norm(alike[i] - way) < 0.6 * side[i] + 2
+            like = np.linalg.norm(alike[i] - way) < reach[i]
             if known and (part or (like and looks.fit[i] > 0.5 * usual)):
                 pixels[i], confidence[i] = way, rough
                 continue
