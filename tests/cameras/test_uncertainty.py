@@ -1,6 +1,7 @@
 """Errors that all samples share: told by the rig, counted in by the law."""
 
 import numpy as np
+import pytest
 from helpers import dependent, trajectory
 
 import vidsindy_lite as vl
@@ -138,6 +139,13 @@ def test_rounded_tracks_may_lie_beside_the_target():
         beside = [track + step / np.sqrt(12) * np.array([1.0, -2.0]) for track in tracks]
         shift = vl.reconstruct(beside, rig) - vl.reconstruct(tracks, rig)
         np.testing.assert_allclose(modes[::2].sum(axis=0) - 2 * modes[1::2].sum(axis=0), shift)
+
+
+def test_one_frame_tells_of_no_motion():
+    x = trajectory(np.random.default_rng(6), 80)
+    rig = vl.Rig.around(x)
+    with pytest.raises(ValueError, match=r"tracks: must have two frames or more, got \[1, 1, 1\]"):
+        tracking_errors([camera.project(x[:1]) for camera in rig.cameras], rig)
 
 
 def test_a_law_of_marks_beside_the_target_has_no_terms_of_their_distance():

@@ -475,9 +475,16 @@ def tracking_errors(
         Scene units; what the trail of each camera, one standard deviation long, adds to the path,
         and then what a shift of its track does, in u and in v, if that is rounded.
         Zero where nothing can be reconstructed.
+
+    Raises
+    ------
+    ValueError
+        If a camera is not calibrated, or the tracks are not one per camera of two frames or more.
     """
     check_calibrated("rig", rig)
     views = check_views(tracks, rig)
+    if len(views[0]) < 2:
+        raise ValueError(f"tracks: must have two frames or more, got {[*map(len, views)]}")
     x, _ = intersect(rig.cameras, views)
     left = np.hstack(missed(rig.cameras, views))
     count = left.shape[1]
