@@ -16,7 +16,7 @@ from pathlib import Path
 import jupytext
 from nbformat import NotebookNode
 
-from vidsindy_lite.repository import PACKAGE, write_file
+from vidsindy_lite.storage import PACKAGE, write_file
 
 BY = re.compile(r"\s*<!-- by: (.*?) -->", re.DOTALL)
 # What a notebook claims: the items and the answers to the paper under these headings.

@@ -19,7 +19,7 @@ from nbformat import NotebookNode
 
 from vidsindy_lite.companion.compare import same_notebook
 from vidsindy_lite.companion.run import execute, tidy
-from vidsindy_lite.repository import PACKAGE, write_file
+from vidsindy_lite.storage import PACKAGE, write_file
 
 NOTEBOOKS = PACKAGE.parent / "notebooks"
 SOLUTIONS = sorted((NOTEBOOKS / "solutions").glob("*.py"))

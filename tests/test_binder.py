@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from vidsindy_lite.repository import PACKAGE
+from vidsindy_lite.storage import PACKAGE
 
 ROOT = PACKAGE.parent
 

@@ -40,7 +40,7 @@ def test_the_contract_is_kept():
     ("module", "line"),
     [
         ("dynamics/solver.py", "def late():\n    from ..cameras import Rig"),
-        ("checks.py", "from .repository import PACKAGE"),
+        ("checks.py", "from .storage import PACKAGE"),
     ],
 )
 def test_the_gate_sees_an_import_against_it(copy, module, line):

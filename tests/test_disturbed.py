@@ -26,7 +26,7 @@ import pytest
 from helpers import SIZE, python, run_quickly
 
 from vidsindy_lite.companion.run import find_notebooks
-from vidsindy_lite.repository import PACKAGE
+from vidsindy_lite.storage import PACKAGE
 
 NOTEBOOKS = {path.stem.partition("_")[0]: path for path in find_notebooks(PACKAGE.parent)}
 SETTINGS = {

@@ -22,7 +22,7 @@ from vidsindy_lite.companion.artifacts import (
 )
 from vidsindy_lite.companion.compare import differences
 from vidsindy_lite.companion.run import find_notebooks, tidy
-from vidsindy_lite.repository import PACKAGE
+from vidsindy_lite.storage import PACKAGE
 
 ROOT = PACKAGE.parent
 NOTEBOOKS = find_notebooks(ROOT)

@@ -8,7 +8,7 @@ import pytest
 import vidsindy_lite as vl
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.cameras import read_calibration
-from vidsindy_lite.reading import DEEPEST, read_tree
+from vidsindy_lite.storage import DEEPEST, read_tree
 from vidsindy_lite.vision import read_tracks
 
 MANY = 30_000

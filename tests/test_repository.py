@@ -7,8 +7,8 @@ from importlib.metadata import packages_distributions
 
 import pytest
 
-from vidsindy_lite import repository
-from vidsindy_lite.repository import PACKAGE, RESULTLESS, code_hash, repository_root, write_file
+from vidsindy_lite import storage
+from vidsindy_lite.storage import PACKAGE, RESULTLESS, code_hash, repository_root, write_file
 
 ROOT = PACKAGE.parent
 
@@ -52,7 +52,7 @@ PARTS = {
 def test_the_hash_follows_code_and_data(
     tmp_path, monkeypatch, file, content, counts, counts_for_results
 ):
-    monkeypatch.setattr(repository, "PACKAGE", tmp_path)
+    monkeypatch.setattr(storage, "PACKAGE", tmp_path)
 
     def hashes():
         code_hash.cache_clear()
@@ -63,7 +63,7 @@ def test_the_hash_follows_code_and_data(
     before = hashes()
     write_file(tmp_path / file, content.encode())
     changed = [one != other for one, other in zip(before, hashes(), strict=True)]
-    monkeypatch.setattr(repository, "library_versions", lambda: ["numpy 1.0"])
+    monkeypatch.setattr(storage, "library_versions", lambda: ["numpy 1.0"])
     assert hashes() != before
     code_hash.cache_clear()
     assert changed == [counts, counts_for_results]

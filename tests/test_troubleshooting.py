@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 import vidsindy_lite as vl
 from vidsindy_lite import study
 from vidsindy_lite.companion.report import check_folder_is_free
-from vidsindy_lite.repository import PACKAGE
+from vidsindy_lite.storage import PACKAGE
 from vidsindy_lite.study import add_noise
 from vidsindy_lite.vision import render
 

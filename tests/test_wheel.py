@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from vidsindy_lite.repository import PACKAGE
+from vidsindy_lite.storage import PACKAGE
 
 ROOT = PACKAGE.parent
 WITHOUT = ("torch", "pysindy", "sklearn", "pandas", "seaborn", "joblib", "filelock", "papermill")

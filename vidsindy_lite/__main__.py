@@ -219,7 +219,7 @@ def _rig_import(options: argparse.Namespace) -> int:
 def _write(text: str, output: str | None) -> int:
     """Text for the terminal, or in UTF-8 for a file."""
     from .checks import check_output
-    from .repository import write_file
+    from .storage import write_file
 
     if output is None:
         print(text, end="")

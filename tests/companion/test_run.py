@@ -14,10 +14,10 @@ import psutil
 import pytest
 from helpers import TinyRepository
 
-from vidsindy_lite import repository
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.companion import run as runner
 from vidsindy_lite.companion.run import NotebookError, execute, run, select_notebooks
+from vidsindy_lite.storage import PACKAGE
 
 pytestmark = pytest.mark.slow  # starts kernels
 
@@ -216,7 +216,7 @@ def wait_for(condition):
 
 def start(tiny):
     command = [sys.executable, "-m", "vidsindy_lite", "run"]
-    here = os.environ | {"PYTHONPATH": str(repository.PACKAGE.parent)}
+    here = os.environ | {"PYTHONPATH": str(PACKAGE.parent)}
     return subprocess.Popen(command, cwd=tiny.notebooks, env=here, start_new_session=True)
 
 

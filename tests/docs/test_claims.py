@@ -3,7 +3,7 @@
 import pytest
 from claims import claims_of, pages
 
-from vidsindy_lite.repository import PACKAGE
+from vidsindy_lite.storage import PACKAGE
 
 ROOT = PACKAGE.parent
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.py"))

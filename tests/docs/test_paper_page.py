@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from vidsindy_lite.repository import PACKAGE
+from vidsindy_lite.storage import PACKAGE
 
 ROOT = PACKAGE.parent
 PAGE = (ROOT / "docs" / "paper.md").read_text("utf-8")

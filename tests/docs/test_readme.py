@@ -7,7 +7,7 @@ import pytest
 
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.cameras import Rig
-from vidsindy_lite.repository import PACKAGE
+from vidsindy_lite.storage import PACKAGE
 
 ROOT = PACKAGE.parent
 PATHS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]

@@ -12,7 +12,7 @@ import pytest
 from browser import CHROMIUM, Browser
 
 from vidsindy_lite.companion.artifacts import save_slider
-from vidsindy_lite.repository import PACKAGE
+from vidsindy_lite.storage import PACKAGE
 
 ROOT = PACKAGE.parent
 LAPTOP, PHONE = 1280, 390  # CSS pixels

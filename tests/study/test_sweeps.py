@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from vidsindy_lite.repository import PACKAGE
+from vidsindy_lite.storage import PACKAGE
 from vidsindy_lite.study.sweeps import remember, sweep
 from vidsindy_lite.vision import Scene, video_info
 
@@ -79,7 +79,8 @@ class Clone:
         (self.package / "powers.py").write_text("def square(number):\n    return number**2\n")
         (self.package / "companion").mkdir()
         (self.package / "companion" / "pages.py").write_text("LINE_WIDTH = 1\n")
-        for module in ("repository.py", "values.py", "study/sweeps.py"):
+        used = ("arrays.py", "checks.py", "storage.py", "values.py", "study/sweeps.py")
+        for module in used:
             (self.package / module).write_bytes((PACKAGE / module).read_bytes())
 
     def edit(self, module, old, new):
@@ -109,11 +110,11 @@ class Clone:
         return json.loads(output)
 
     def fail(self, tasks, **environment):
-        """The last line of the error of a sweep that fails."""
+        """What a sweep that fails raises; what its workers leave behind may be told after it."""
         process = self.start(tasks, **environment)
         _, errors = process.communicate(timeout=120)
         assert process.returncode == 1
-        return errors.strip().splitlines()[-1]
+        return [line for line in errors.splitlines() if "Error: " in line][-1]
 
     def called(self):
         """Numbers of the tasks that were computed since the last start."""

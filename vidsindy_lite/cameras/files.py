@@ -35,7 +35,7 @@ from scipy.spatial.transform import Rotation
 
 from ..arrays import Floats
 from ..checks import check_array, check_image_size, shown
-from ..reading import TREES, check_file, read_arrays, read_text, read_tree, reading
+from ..storage import TREES, check_file, read_arrays, read_text, read_tree, reading
 from .models import LENS, PerspectiveCamera
 from .rig import Rig
 

@@ -44,8 +44,7 @@ from ..checks import (
     check_vector,
     shown,
 )
-from ..reading import check_file, read_tree, reading
-from ..repository import write_file
+from ..storage import check_file, read_tree, reading, write_file
 from .models import (
     MODELS,
     PARALLEL,

@@ -34,7 +34,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
-from ..repository import library_versions, repository_root, write_file
+from ..storage import library_versions, repository_root, write_file
 from ..values import as_json
 from .pages import page
 

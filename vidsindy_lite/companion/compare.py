@@ -20,7 +20,7 @@ from PIL import Image, ImageSequence
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from ..checks import check_path
-from ..repository import write_file
+from ..storage import write_file
 from .artifacts import files_of, read_records
 from .pages import page
 

@@ -22,7 +22,7 @@ import numpy as np
 from ..arrays import Floats, Image
 from ..checks import check_path
 from ..pipeline import VideoDiscovery
-from ..repository import write_file
+from ..storage import write_file
 from ..vision import pick_frames, video_info
 
 FRAMES = 24  # of each video on the page

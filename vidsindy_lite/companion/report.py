@@ -29,7 +29,7 @@ from ..dynamics import Discovery, Quantity, Swing
 from ..pipeline import VideoDiscovery
 from ..progress import bar
 from ..refusal import Refused, Stopped
-from ..repository import write_files
+from ..storage import write_files
 from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
 from ..values import as_json
 from ..vision import VideoInfo, read_frame, video_info

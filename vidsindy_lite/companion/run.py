@@ -30,7 +30,7 @@ from nbformat import NotebookNode
 from papermill.exceptions import strip_color
 from tqdm import tqdm
 
-from ..repository import PACKAGE, code_hash, repository_root, write_file
+from ..storage import PACKAGE, code_hash, repository_root, write_file
 from .artifacts import read_records, with_palette, write_index
 from .compare import outdated, replace, same_notebook
 

@@ -19,8 +19,7 @@ from tqdm import tqdm
 
 from ..arrays import Bools, Floats
 from ..checks import MALFORMED, check_array, check_choice, check_output, shown
-from ..reading import check_file, read_tree
-from ..repository import write_file
+from ..storage import check_file, read_tree, write_file
 from ..values import built, decoded, encoded
 from .bspline import smooth
 from .collocation import Fit, WithCurve

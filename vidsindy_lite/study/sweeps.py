@@ -35,7 +35,7 @@ from uuid import uuid4
 from tqdm import tqdm
 
 from ..checks import MALFORMED
-from ..repository import PACKAGE, RESULTLESS, code_hash, repository_root, write_file
+from ..storage import PACKAGE, RESULTLESS, code_hash, repository_root, write_file
 from ..values import decoded, encoded
 
 Task = TypeVar("Task")

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..checks import check_integer, check_number, shown
-from ..reading import check_file, read_tree
+from ..storage import check_file, read_tree
 
 
 @dataclass(frozen=True)

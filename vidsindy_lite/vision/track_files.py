@@ -37,7 +37,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Bools, Floats
-from ..reading import check_file, read_text, reading
+from ..storage import check_file, read_text, reading
 
 SUFFIXES = frozenset({".csv", ".tsv", ".txt", ".dat", ".xml"})
 

@@ -18,7 +18,7 @@ from tqdm import trange
 
 from ..arrays import Floats, Floats32, Image
 from ..checks import check_integer, check_path
-from ..repository import write_file
+from ..storage import write_file
 from .detector import WEIGHTS
 from .network import STRIDE, Network, anchors, as_input
 from .rendering import BACKGROUNDS, COLOURS, Box, LabelledFrame, Scene, draw_frames
