@@ -15,7 +15,7 @@ from helpers import TinyRepository
 from hypothesis import settings
 from xdist.scheduler import LoadScopeScheduling
 
-from vidsindy_lite import pipeline
+from vidsindy_lite import vision
 
 # The same examples in every run, so that a red test stays red; no deadline on a busy machine.
 settings.register_profile("repeatable", derandomize=True, deadline=None)
@@ -45,7 +45,7 @@ class Spread(LoadScopeScheduling):
 def tracked_once():
     """Tracks each video file once, however many tests of a module discover from it."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "track", cache(pipeline.track))
+        patch.setattr(vision, "track", cache(vision.track))
         yield
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import vidsindy_lite as vl
-from vidsindy_lite import pipeline, study
+from vidsindy_lite import cameras, study
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +87,7 @@ def test_a_law_from_noisy_tracks_does_not_bend_the_path_to_fit_their_noise():
 def test_synchronous_cameras_have_no_lags_and_no_others_are_tried(case, monkeypatch):
     rig, tracks = case
     known = vl.observe_tracks(tracks, rig, np.arange(150), lags=(0, 0, 0))
-    monkeypatch.setattr(pipeline, "learn_lags", lambda *_, **__: pytest.fail("tried lags"))
+    monkeypatch.setattr(cameras, "learn_lags", lambda *_, **__: pytest.fail("tried lags"))
     seen = vl.observe_tracks(tracks, rig, np.arange(150), lags="synchronous")
     np.testing.assert_allclose(seen.x, known.x)
     np.testing.assert_array_equal(seen.lags.frames, np.zeros(3))

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
-from vidsindy_lite.refusal import Refused, refusing
+from vidsindy_lite.pipeline import Refused, refusing
 
 LOOP = np.column_stack((np.cos(np.arange(200) / 9), np.sin(np.arange(200) / 7))) * 90 + 200
 

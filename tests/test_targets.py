@@ -10,8 +10,7 @@ from scipy.linalg import expm
 import vidsindy_lite as vl
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.companion.report import write_refusal, write_report
-from vidsindy_lite.pipeline import _driven, check_found
-from vidsindy_lite.refusal import Refused
+from vidsindy_lite.pipeline import Refused, _driven, check_found
 
 FRAMES, STEP = 200, 0.05
 OWN = np.array([[-0.02, -1.1, 0.0], [1.1, -0.02, 0.7], [0.0, -0.7, -0.02]])

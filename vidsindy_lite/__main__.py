@@ -91,7 +91,7 @@ def _discover(options: argparse.Namespace) -> int:
     from .cameras import Rig, list_lags
     from .companion.report import PAGE, check_folder_is_free, write_refusal, write_report
     from .dynamics import check_library
-    from .refusal import Refused, Stopped
+    from .pipeline import Refused, Stopped
     from .vision import check_detector
 
     if bool(options.videos) == bool(options.tracks):
@@ -184,7 +184,7 @@ def _pick(options: argparse.Namespace) -> int:
     examples:
       python -m vidsindy_lite pick a.mp4 b.mp4 c.mp4
     """
-    from .companion.pages import write_pick_page
+    from .companion.report import write_pick_page
 
     print(f"open {write_pick_page(options.videos, options.out)} in a browser")
     return 0

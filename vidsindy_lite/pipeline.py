@@ -7,7 +7,8 @@ looks for the law that it obeys.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -15,35 +16,9 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import cameras, dynamics, vision
 from .arrays import Floats
-from .cameras import (
-    ALIKE,
-    DISAGREEMENT,
-    GROSS,
-    AffineCamera,
-    Clock,
-    Lags,
-    PerspectiveCamera,
-    Rig,
-    align,
-    check_learnable,
-    disagreement,
-    explain,
-    factorised,
-    find_mistake,
-    identify,
-    learn_cameras,
-    learn_lags,
-    list_lags,
-    posed,
-    reconstruct,
-    residuals,
-    side_by_side,
-    smooth,
-    stacked,
-    systematic_errors,
-    tracking_errors,
-)
+from .cameras import Clock, Lags, Rig
 from .checks import (
     check_choice,
     check_instance,
@@ -56,34 +31,9 @@ from .checks import (
     check_vector,
     shown,
 )
-from .dynamics import (
-    Discovery,
-    Form,
-    Library,
-    PolynomialSystem,
-    Quantity,
-    Swing,
-    check_library,
-    check_order,
-    check_orientation,
-    discover,
-    variable_names,
-)
-from .dynamics import smooth as smooth_curves
+from .dynamics import Discovery, Library, Quantity, Swing
 from .progress import bar
-from .refusal import Refused, refusing
-from .vision import (
-    Hint,
-    Track,
-    TrackFile,
-    VideoInfo,
-    check_detector,
-    frame_clock,
-    read_tracks,
-    track,
-    track_targets,
-    video_info,
-)
+from .vision import Hint, TrackFile
 
 _OTHER_LAG = 0.02  # frames by which it may differ without a word
 _SMOOTHED = 8  # frames of a stretch, from which its curve can be told from noise
@@ -135,8 +85,8 @@ class Observation:
     @property
     def residuals(self) -> list[Floats]:
         """Tracks minus what the cameras see of the path, in the shape of the tracks."""
-        missed = residuals([stacked(track, 2) for track in self.tracks], self.rig)
-        return [side_by_side(one, self.targets) for one in missed]
+        missed = cameras.residuals([cameras.stacked(track, 2) for track in self.tracks], self.rig)
+        return [cameras.side_by_side(one, self.targets) for one in missed]
 
 
 def observe(
@@ -199,25 +149,35 @@ def observe(
         What can be told before a video is tracked is.
     """
     if rig is not None:
-        check_learnable(rig)
-    check_detector(detector)
+        cameras.check_learnable(rig)
+    vision.check_detector(detector)
     check_integer("targets", targets, least=1)
     if targets > 1:
         _check_several(targets, rig, detector, hints)
     files = _check_paths(paths, rig)
-    shots = [video_info(path) for path in files]
+    shots = [vision.video_info(path) for path in files]
     if rig is None:
-        rig = Rig(tuple(PerspectiveCamera(image_size=shot.size) for shot in shots))
-    _check_shots(files, shots, rig)
+        rig = Rig(tuple(cameras.PerspectiveCamera(image_size=shot.size) for shot in shots))
     names = [path.name for path in files]
-    clocks = [frame_clock(path) for path in files]
+    for name, shot, camera in zip(names, shots, rig.cameras, strict=True):
+        if shot.frames < 2:
+            raise ValueError(f"paths: {name} must be a video, got a single frame")
+        if shot.size != camera.image_size:
+            raise ValueError(
+                f"paths: {name} must have the image size of its camera in the rig, "
+                f"{camera.image_size}, got {shot.size}"
+            )
+    clocks = [vision.frame_clock(path) for path in files]
     clock = Clock.of_videos([shot.fps for shot in shots], clocks, t)
     given = _check_lags(lags, clock, names)
     films = bar(progress, "track", iterable=list(zip(files, shots, strict=True)))
-    told = _check_hints(hints, files)
+    if hints is None:
+        hints = [None] * len(files)
+    elif not isinstance(hints, Sequence) or len(hints) != len(files):
+        raise ValueError(f"hints: must be one per video ({len(files)}) or None, got {shown(hints)}")
     seen = [
         _track_one(path, shot.frames, detector, hint, targets)
-        for (path, shot), hint in zip(films, told, strict=True)
+        for (path, shot), hint in zip(films, hints, strict=True)
     ]
     tracks = [np.hstack([track.pixels for track in found]) for found in seen]
     check_found(tracks, names, targets)
@@ -264,7 +224,7 @@ def observe_tracks(
     ValueError
         If the numbers of tracks, cameras and times disagree, or as `observe` does.
     """
-    check_learnable(rig)
+    cameras.check_learnable(rig)
     raw = check_tracks(tracks, len(rig.cameras))
     if min(map(len, raw)) < 2:
         raise ValueError(f"tracks: must have two frames or more, got {[*map(len, raw)]}")
@@ -294,24 +254,25 @@ def _observed(
     begun = np.zeros(len(raw)) if lags is None else lags
     if not rig.is_measured:
         with refusing("cameras", raw, names):
-            far = factorised(raw, rig, clock.rates, clock.uneven, lags)
+            far = cameras.factorised(raw, rig, clock.rates, clock.uneven, lags)
             if far is None or far.moving > 1:  # a line tells of no lens
-                most = GROSS if far is None else min(GROSS, ALIKE * far.lags.residual)
-                at_once = align(raw, begun, clock.rates, clock.uneven)
+                alike = np.inf if far is None else cameras.ALIKE * far.lags.residual
+                most = min(cameras.GROSS, alike)
+                at_once = cameras.align(raw, begun, clock.rates, clock.uneven)
                 try:
-                    rig, far = posed(at_once, rig, lags is not None, most), None
+                    rig, far = cameras.posed(at_once, rig, lags is not None, most), None
                 except ValueError:
                     if far is None:
                         raise
             if far is not None:
-                tracks = align(raw, far.lags.frames, clock.rates, clock.uneven)
+                tracks = cameras.align(raw, far.lags.frames, clock.rates, clock.uneven)
                 warnings = (*far.lags.warnings, *doubts)
                 return _concluded(raw, tracks, far.rig, far.lags, clock, [], warnings, far.moving)
             doubts = (*rig.warnings, *doubts)
     first: list[str] = []
     start = lags
     if not synchronous:
-        mistake = find_mistake(raw, rig, clock.rates, clock.uneven, begun, names)
+        mistake = cameras.find_mistake(raw, rig, clock.rates, clock.uneven, begun, names)
         if mistake is not None:  # and is put right, as nothing can be learned with it
             first, raw = [mistake.text], mistake.tracks
             clock = clock.mended(mistake.rates, mistake.clocks)
@@ -321,22 +282,22 @@ def _observed(
             nothing = np.zeros(len(raw))
             best = Lags(nothing, clock.rates, nothing, 0.0, clocks=tuple(clock.uneven or ()))
         else:
-            uneven = clock.uneven
-            best = learn_lags(raw, rig, clock.rates, start=start, clocks=uneven, progress=progress)
+            rates, uneven = clock.rates, clock.uneven
+            best = cameras.learn_lags(raw, rig, rates, start, uneven, progress=progress)
         if lags is not None and _apart(lags, best, _WRONG_LAG):
             raise ValueError(
-                f"lags: must make the views agree, got ({list_lags(lags)}) frames where "
-                f"({list_lags(best.frames)}) do: leave them out, or check them"
+                f"lags: must make the views agree, got ({cameras.list_lags(lags)}) frames where "
+                f"({cameras.list_lags(best.frames)}) do: leave them out, or check them"
             )
     used = best.frames if lags is None else lags
-    tracks = align(raw, used, best.rates, clock.uneven)
+    tracks = cameras.align(raw, used, best.rates, clock.uneven)
     with refusing("cameras", raw, names):
-        learned = learn_cameras(tracks, rig)
-    missed = disagreement(tracks, learned)
+        learned = cameras.learn_cameras(tracks, rig)
+    missed = cameras.disagreement(tracks, learned)
     told = best
     if lags is not None:
         told = replace(best, frames=lags, errors=0 * lags, residual=max(missed), warnings=())
-    modes = systematic_errors(raw, rig, learned, told)
+    modes = cameras.systematic_errors(raw, rig, learned, told)
     disagreeing = _rig_warnings(missed, tracks, rig, learned, names, used, best)
     warnings = (*first, *disagreeing, *learned.warnings, *doubts, *told.warnings)
     return _concluded(raw, tracks, learned, told, clock, modes, warnings)
@@ -357,9 +318,9 @@ def _concluded(
     Its errors are the modes and what the tracks of all frames share.
     """
     motion = [_smoothed(clock.times, track) for track in tracks]
-    errors = np.stack([*modes, *tracking_errors(tracks, rig, motion, raw)])
+    errors = np.stack([*modes, *cameras.tracking_errors(tracks, rig, motion, raw)])
     moves = np.arange(3) < moving
-    x = reconstruct(tracks, rig) * moves
+    x = cameras.reconstruct(tracks, rig) * moves
     return Observation(tracks, rig, lags, clock.times, x, errors * moves, warnings)
 
 
@@ -374,23 +335,23 @@ def _several_observed(
 ) -> Observation:
     """What the tracks (n_i, 2 k) of k targets tell: once told apart, they are one long track."""
     count, begun = raw[0].shape[1] // 2, np.zeros(len(raw)) if lags is None else lags
-    each = [np.split(track, count, axis=1) for track in raw]
-    aligned = [align(one, begun, clock.rates, clock.uneven) for one in zip(*each, strict=True)]
+    each = zip(*(np.split(track, count, axis=1) for track in raw), strict=True)
+    aligned = [cameras.align(one, begun, clock.rates, clock.uneven) for one in each]
     tracks = [np.hstack(views) for views in zip(*aligned, strict=True)]
     with refusing("cameras", tracks, names):
-        who = identify(tracks, rig)
-    rows = [stacked(track, 2) for track in who.tracks]
+        who = cameras.identify(tracks, rig)
+    rows = [cameras.stacked(track, 2) for track in who.tracks]
     t, step = clock.times, np.diff(clock.times).min()
     later = (t[-1] - t[0] + 2 * step) * np.arange(count)[:, None]
     long = Clock.of_tracks((np.append(t, t[-1] + step) + later).ravel()[:-1], rows)
     seen = _observed(rows, rig, long, 0 * begun, names, (*doubts, *who.doubts), progress)
-    modes = [side_by_side(mode, count) for mode in seen.systematic]
+    modes = [cameras.side_by_side(mode, count) for mode in seen.systematic]
     return replace(
         seen,
-        tracks=tuple(side_by_side(track, count) for track in seen.tracks),
+        tracks=tuple(cameras.side_by_side(track, count) for track in seen.tracks),
         lags=replace(seen.lags, frames=begun, rates=clock.rates),
         t=t,
-        x=side_by_side(seen.x, count),
+        x=cameras.side_by_side(seen.x, count),
         systematic=np.reshape(modes, (len(modes), len(t), 3 * count)),
     )
 
@@ -448,45 +409,23 @@ def _check_several(
         )
 
 
-def _check_shots(files: Sequence[Path], shots: Sequence[VideoInfo], rig: Rig) -> None:
-    """That each file is a video of the size that its camera has."""
-    for path, shot, camera in zip(files, shots, rig.cameras, strict=True):
-        if shot.frames < 2:
-            raise ValueError(f"paths: {path.name} must be a video, got a single frame")
-        if shot.size != camera.image_size:
-            raise ValueError(
-                f"paths: {path.name} must have the image size of its camera in the rig, "
-                f"{camera.image_size}, got {shot.size}"
-            )
-
-
-def _check_hints(
-    hints: Sequence[Hint | None] | None, files: Sequence[Path]
-) -> Sequence[Hint | None]:
-    """One hint per video, or none."""
-    if hints is None:
-        return [None] * len(files)
-    if not isinstance(hints, Sequence) or len(hints) != len(files):
-        raise ValueError(f"hints: must be one per video ({len(files)}) or None, got {shown(hints)}")
-    return hints
-
-
 def _smoothed(t: Floats, values: Floats) -> Floats:
     """What (n, k) values that change with the motion would be without the noise of its frames."""
     clean, rng = values.copy(), np.random.default_rng(0)
     seen = np.flatnonzero(np.isfinite(values).all(axis=1))
     for stretch in np.split(seen, np.flatnonzero(np.diff(seen) > 1) + 1):
         if len(stretch) >= _SMOOTHED:
-            curve = smooth_curves([(t[stretch], values[stretch])], rng).splines[0]
+            curve = dynamics.smooth([(t[stretch], values[stretch])], rng).splines[0]
             clean[stretch] = curve(t[stretch])
     return clean
 
 
 def _track_one(
     path: Path, frames: int, detector: str | os.PathLike, hint: Hint | None, targets: int
-) -> tuple[Track, ...]:
+) -> tuple[vision.Track, ...]:
     """Track the targets of a video that should have so many frames."""
-    found = (track(path, detector, hint),) if targets == 1 else track_targets(path, targets)
+    one = targets == 1
+    found = (vision.track(path, detector, hint),) if one else vision.track_targets(path, targets)
     if len(found[0].pixels) != frames:
         raise ValueError(
             f"paths: {path.name} must hold the {frames} frames that its header states, got "
@@ -537,10 +476,11 @@ def _rig_warnings(
     tracks themselves tell.
     """
     wrong_lag = _apart(lags, best, _OTHER_LAG)
-    if wrong_lag and max(missed) <= DISAGREEMENT:
+    if wrong_lag and max(missed) <= cameras.DISAGREEMENT:
         return [
             "the lags that are given differ from those of the tracks: "
-            f"({list_lags(lags)}) for ({list_lags(best.frames)}) frames: leave them out, or check"
+            f"({cameras.list_lags(lags)}) for ({cameras.list_lags(best.frames)}) frames: "
+            "leave them out, or check"
         ]
     sizes = ", ".join(f"{size:.1f}" for size in missed)
     apart = (
@@ -549,12 +489,12 @@ def _rig_warnings(
     if wrong_lag:  # by too little to refuse them
         return [
             f"the rig does not agree with the tracks at the lags that are given: {apart}: the lags "
-            f"({list_lags(best.frames)}) would explain it best"
+            f"({cameras.list_lags(best.frames)}) would explain it best"
         ]
-    why = explain(tracks, given, learned)
-    if why is not None and why.left <= max(GROSS, max(missed) / 3):
+    why = cameras.explain(tracks, given, learned)
+    if why is not None and why.left <= max(cameras.GROSS, max(missed) / 3):
         advice = f"{why.text(names)} would explain it best"
-    elif max(missed) > GROSS and smooth(tracks, learned):
+    elif max(missed) > cameras.GROSS and cameras.smooth(tracks, learned):
         advice = (
             "no single cause explains it; check the positions and normals, the scales and angles "
             "that are given, and that at least half of the shortest video is in common with the "
@@ -757,17 +697,17 @@ def _checked(
 
     And whether nothing is asked of the law.
     """
-    terms = check_library(degree, library)
-    check_order(order, origin)
-    check_orientation(orientation, terms, 3 * targets, origin)
-    Form.of(variable_names(3 * targets), terms, 2 if order == 2 else 1)
+    terms = dynamics.check_library(degree, library)
+    dynamics.check_order(order, origin)
+    dynamics.check_orientation(orientation, terms, 3 * targets, origin)
+    dynamics.Form.of(dynamics.variable_names(3 * targets), terms, 2 if order == 2 else 1)
     check_integer("seed", seed)
     chosen = {"order": order, "origin": origin, "orientation": orientation}
     unasked = degree is None and library is None and order == "auto"
     return {"library": terms, "seed": seed} | chosen, unasked
 
 
-def _driven(law: PolynomialSystem) -> str:
+def _driven(law: dynamics.PolynomialSystem) -> str:
     """Which of several targets, of three coordinates each, drive which others by what terms."""
     target = np.arange(law.d) % (law.d // law.order) // 3 + 1  # of places, and of velocities
     by: dict[tuple[int, int], list[str]] = {}
@@ -791,7 +731,7 @@ def _read(
     read: list[TrackFile] = []
     for given in tracks:
         if isinstance(given, str | os.PathLike):
-            read += read_tracks(given, individual)
+            read += vision.read_tracks(given, individual)
         else:
             name = f"tracks[{len(read)}]"
             read.append(TrackFile(name, check_rows(name, cast("ArrayLike", given), 2), None))
@@ -844,11 +784,90 @@ def _with_law(
 
     In a frame that is any affine map of space, the default is a law that is linear in any other.
     """
-    if default and isinstance(seen.rig.cameras[0], AffineCamera):
+    if default and isinstance(seen.rig.cameras[0], cameras.AffineCamera):
         how |= {"library": Library.polynomial(1), "order": 2}
     moves = np.nanmin(seen.x, axis=0) < np.nanmax(seen.x, axis=0)  # in a plane or on a line
     with refusing("law", seen.tracks, names):
-        found = discover(seen.t, seen.x[:, moves], systematic=seen.systematic[..., moves], **how)
+        x, modes = seen.x[:, moves], seen.systematic[..., moves]
+        found = dynamics.discover(seen.t, x, systematic=modes, **how)
     # Who keeps the law alone keeps the doubts about what it was found in.
     law = replace(found, warnings=(*seen.warnings, *found.warnings))
     return VideoDiscovery(**vars(seen) | {"warnings": law.warnings}, discovery=law)
+
+
+# ----------------------------------------------------------------------------------------- refusals
+
+_JUMP = 8.0  # medians of a track's steps; more is a jump, ...
+_JUMPY = 0.02  # ... and a track with more of them than this, ...
+_STILL = 2.0  # pixels; ... or one that stays within that, ...
+_SPARSE = 0.5  # ... or of a target that is seen in fewer frames than that, may be of something else
+
+
+class Refused(ValueError):
+    """Tracks from which no path or law can be had.
+
+    Parameters
+    ----------
+    message : str
+    step : {"track", "lags", "cameras", "law"}
+        What could not be done.
+    tracks : sequence of ndarray, shape (n_i, 2)
+        Pixels of the target in each video up to there.
+    """
+
+    def __init__(self, message: str, step: str, tracks: Sequence[Floats]) -> None:
+        super().__init__(message)
+        self.step = step
+        self.tracks = tuple(tracks)
+
+
+class Stopped(KeyboardInterrupt):
+    """An interruption when there were tracks already; see `Refused`."""
+
+    def __init__(self, step: str, tracks: Sequence[Floats]) -> None:
+        super().__init__("stopped before there was a law")
+        self.step = step
+        self.tracks = tuple(tracks)
+
+
+@contextmanager
+def refusing(step: str, tracks: Sequence[Floats], names: Sequence[str]) -> Iterator[None]:
+    """What cannot be done in a step, as a refusal that says where to look first.
+
+    And an interruption with the tracks, which took the longest.
+    """
+    try:
+        yield
+    except (Refused, Stopped):
+        raise
+    except KeyboardInterrupt:
+        raise Stopped(step, tracks) from None
+    except ValueError as error:
+        message = f"{error}; likely causes, in this order: {_likely_causes(step, tracks, names)}"
+        raise Refused(message, step, tracks) from None
+
+
+def _likely_causes(step: str, tracks: Sequence[Floats], names: Sequence[str]) -> str:
+    """Tracker, lags and rig, with what the tracks say of the first."""
+    strange = [
+        name for track, name in zip(tracks, names, strict=True)
+        if any(map(_is_strange, np.split(track, track.shape[1] // 2, axis=1)))
+    ]  # fmt: skip
+    tracker = "the tracker" + (f" (look at {', '.join(strange)})" if strange else "")
+    if len(tracks) == 1:
+        return tracker
+    if strange or step == "track":
+        return f"{tracker}, the lags, the rig"
+    return f"the lags, the rig, {tracker}" if step == "lags" else f"the rig, the lags, {tracker}"
+
+
+def _is_strange(track: Floats) -> bool:
+    """Whether a track jumps, trembles, stands still, or is mostly missing."""
+    seen = np.isfinite(track).all(axis=1)
+    steps, turns = (np.hypot(*np.diff(track, n, axis=0).T) for n in (1, 2))
+    steps, turns = steps[np.isfinite(steps)], turns[np.isfinite(turns)]
+    if not len(turns) or seen.mean() < _SPARSE:
+        return True
+    jumps = np.mean(steps > _JUMP * max(np.median(steps), 1.0)) > _JUMPY
+    still = np.ptp(track[seen], axis=0).max() < _STILL
+    return bool(jumps or still or np.median(turns) > np.median(steps))

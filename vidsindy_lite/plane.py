@@ -35,8 +35,7 @@ from .dynamics import (
     on_circle,
     smooth,
 )
-from .pipeline import VideoDiscovery, check_found
-from .refusal import refusing
+from .pipeline import VideoDiscovery, check_found, refusing
 from .vision import Hint, check_detector, frame_clock, track, video_info
 
 MARK = 1.0

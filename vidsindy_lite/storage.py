@@ -251,7 +251,7 @@ LIBRARIES = (
     "matplotlib", "seaborn",
 )  # fmt: skip
 """On whose versions results depend."""
-RESULTLESS = ("companion", "plots", "__main__", "refusal")
+RESULTLESS = ("companion", "plots", "__main__")
 """Folders and modules of the package that compute no result of a sweep."""
 
 

@@ -234,7 +234,7 @@ def test_differences_are_shown_side_by_side_and_replaced_by_the_next(folders, tm
 def test_other_peoples_files_are_not_touched(folders, tmp_path, content):
     output = tmp_path / "page.html"
     output.mkdir() if content is None else output.write_text(content)
-    with pytest.raises(ValueError, match="output: must be a new file or an earlier comparison"):
+    with pytest.raises(ValueError, match="output: must be a new file or an earlier page of"):
         write_differences(*folders, output)
     assert output.is_dir() if content is None else output.read_text() == content
 

@@ -9,7 +9,7 @@ from browser import CHROMIUM, Browser
 
 import vidsindy_lite as vl
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.companion.pages import FRAMES, write_pick_page
+from vidsindy_lite.companion.report import FRAMES, write_pick_page
 
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here to open the page in")
 

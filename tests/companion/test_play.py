@@ -8,7 +8,7 @@ import numpy as np
 import vidsindy_lite as vl
 from vidsindy_lite import study
 from vidsindy_lite.cameras import Lags
-from vidsindy_lite.companion.pages import law_over_videos
+from vidsindy_lite.companion.report import law_over_videos
 from vidsindy_lite.pipeline import Observation
 
 LATER = 4  # frames

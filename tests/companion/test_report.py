@@ -27,8 +27,7 @@ from vidsindy_lite.companion.report import (
     write_refusal,
     write_report,
 )
-from vidsindy_lite.pipeline import Observation
-from vidsindy_lite.refusal import Refused
+from vidsindy_lite.pipeline import Observation, Refused
 from vidsindy_lite.vision import read_tracks
 
 

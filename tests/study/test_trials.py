@@ -7,18 +7,21 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import discover
-from vidsindy_lite.pipeline import Observation
-from vidsindy_lite.refusal import Refused
+from vidsindy_lite.pipeline import Observation, Refused
 from vidsindy_lite.study import score
 from vidsindy_lite.study import trials as experiments
-from vidsindy_lite.study.films import FilmResult, FilmTask, detect_near, film, run_film
 from vidsindy_lite.study.paper import REFERENCE_OFFSET, SYSTEMS
 from vidsindy_lite.study.trials import (
     SOURCES,
+    FilmResult,
+    FilmTask,
     Trial,
     TrialResult,
     by_condition,
+    detect_near,
+    film,
     grid,
+    run_film,
     run_trial,
     run_trials,
     significant,

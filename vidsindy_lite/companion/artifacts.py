@@ -36,7 +36,7 @@ from PIL import Image
 
 from ..storage import library_versions, repository_root, write_file
 from ..values import as_json
-from .pages import page
+from .report import page
 
 INDEX = "README.md"
 DIGITS = 6  # of the numbers in the records

@@ -22,7 +22,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from ..checks import check_path
 from ..storage import write_file
 from .artifacts import files_of, read_records
-from .pages import page
+from .report import check_page, page
 
 TOLERANCE = 1e-3  # of a number, relative, where its record states no other
 OF_LIST = 1e-4  # of the largest of a list: what is nearly zero beside it has fewer digits
@@ -34,7 +34,6 @@ VISIBLE = 24  # grey levels by which the mean of a square differs so that one se
 FEW = 0.002  # share of such squares of which one takes no notice
 TIMES = "seconds"  # what is called so differs from run to run, and counts nowhere
 
-_PAGE_MARK = '<meta name="generator" content="vidsindy_lite compare">'
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", re.IGNORECASE)
 _ERROR = re.compile(r"(?:±|\+-) ?$")
 _WITH_ERROR = re.compile(rf" ?(?:±|\+-) ?({_NUMBER.pattern})", re.IGNORECASE)
@@ -104,10 +103,7 @@ def write_differences(
     ValueError
         As of `differences`, or if another file is at `output`.
     """
-    output = check_path("output", output)
-    earlier = output.read_text("utf-8", "replace") if output.is_file() else ""
-    if output.exists() and _PAGE_MARK not in earlier:
-        raise ValueError(f"output: must be a new file or an earlier comparison, got '{output}'")
+    output = check_page("output", output, "compare.html")
     found = differences(committed, regenerated)
     pictures = {
         name: {

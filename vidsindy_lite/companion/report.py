@@ -1,10 +1,13 @@
-"""The report on a law discovered from videos: a page to read, and the same as data.
+"""The report on a law discovered from videos, and other pages; templates lie beside this module.
 
 `write_report` writes four files into a folder: ``report.html``, which needs no other file and no
-network, ``result.json`` (``result.schema.json`` beside this module says what is in it),
-``tracks.csv``, and ``rig.toml`` with the learned cameras. `write_refusal` does the same, without
-cameras, if there is no law to report: then a picture of the tracks is what helps. All of them
-appear when all are made; the folder itself and whatever else it holds stay as they are.
+network, ``result.json`` (``result.schema.json`` says what is in it), ``tracks.csv``, and
+``rig.toml`` with the learned cameras. `write_refusal` does the same, without cameras, if there is
+no law to report: then a picture of the tracks is what helps. All of them appear when all are made;
+the folder itself and whatever else it holds stay as they are.
+
+`write_pick_page` writes the page on which a user shows the target: frames spread through each video
+are inside, and what is drawn becomes a line for the rig file and one for Python.
 """
 
 from __future__ import annotations
@@ -16,24 +19,26 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import cast
 
+import av
+import cv2
+import jinja2
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
 
-from ..arrays import Floats
+from ..arrays import Floats, Image
 from ..cameras import DISAGREEMENT, Rig, stacked
 from ..checks import check_path
 from ..dynamics import Discovery, Quantity, Swing
-from ..pipeline import VideoDiscovery
+from ..pipeline import Refused, Stopped, VideoDiscovery
 from ..progress import bar
-from ..refusal import Refused, Stopped
 from ..storage import write_files
 from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
 from ..values import as_json
-from ..vision import VideoInfo, read_frame, video_info
-from .pages import law_over_videos, page
+from ..vision import VideoInfo, pick_frames, read_frame, video_info
 
 LETTERS = "abcdefgh"  # of several targets, in the heads of tracks
 LONGEST_NAME = 30  # characters above a picture
@@ -48,6 +53,48 @@ STEPS = {
 }
 _TITLES = ("<title>Law of a moving target", "<title>No law: ")  # of pages that are ours
 _BEGIN = b'{\n "format": '  # of data that are
+
+FRAMES = 24  # of each video on the page
+_LONGEST = 1280  # pixels of a frame's longer side there
+_QUALITY = 80  # of the frames' compression
+
+_INSTANTS = 200  # of the film at most
+_RATE = 25  # frames a second
+_HEIGHT = 270  # pixels of each view, which stand side by side
+_TRAIL = 40  # frames of the film that the curve reaches back
+_CURVE = (0, 114, 178)  # as in the figures
+_TUBE = 2.0  # standard deviations of the track around the law
+_FAINT = 0.4  # share of the tube's colour
+
+_PAGES = jinja2.Environment(
+    loader=jinja2.FileSystemLoader(Path(__file__).parent),
+    autoescape=jinja2.select_autoescape(["html"]),
+    undefined=jinja2.StrictUndefined,
+    keep_trailing_newline=True,
+)
+
+
+def page(template: str, **values: object) -> str:
+    """A template filled in; in HTML, values are escaped."""
+    return _PAGES.get_template(template).render(values)
+
+
+def check_page(name: str, path: str | os.PathLike, template: str) -> Path:
+    """That a page may be written there: nothing is, or an earlier one of this template.
+
+    Raises
+    ------
+    ValueError
+        If another file is.
+    """
+    path, kind = check_path(name, path), Path(template).stem
+    mark = f'<meta name="generator" content="vidsindy_lite {kind}">'
+    if path.exists() and not (path.is_file() and mark in path.read_text("utf-8", "replace")):
+        raise ValueError(f"{name}: must be a new file or an earlier page of {kind}, got '{path}'")
+    return path
+
+
+# --------------------------------------------------------------------------------------- the report
 
 
 def check_folder_is_free(folder: str | Path) -> Path:
@@ -403,3 +450,123 @@ def _encoded(figure: Figure) -> str:
     figure.savefig(image, format="png", dpi=110)
     plt.close(figure)
     return base64.b64encode(image.getvalue()).decode()
+
+
+# -------------------------------------------------------------------------- the law over the videos
+
+
+def law_over_videos(found: VideoDiscovery, paths: Sequence[str | Path]) -> bytes:
+    """The curve that obeys the law, drawn over the frames of all views, as WebM (VP9).
+
+    Around the curve lies a tube of two standard deviations of the track around it.
+
+    Parameters
+    ----------
+    found : VideoDiscovery
+    paths : sequence of path
+        The videos, one per camera.
+
+    Returns
+    -------
+    bytes
+    """
+    instants = range(0, len(found.t), -(-len(found.t) // _INSTANTS))
+    views = [_view(found, Path(path), i, instants) for i, path in enumerate(paths)]
+    file = io.BytesIO()
+    with av.open(file, "w", format="webm") as container:
+        options = {"deadline": "realtime", "cpu-used": "8", "crf": "36", "b": "0"}
+        stream = container.add_stream("libvpx-vp9", _RATE, options=options)
+        for k, images in enumerate(zip(*views, strict=True)):
+            side_by_side = np.hstack(images)
+            if k == 0:
+                stream.width, stream.height = side_by_side.shape[1::-1]
+                stream.pix_fmt = "yuv420p"
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(side_by_side, "rgb24")))
+        container.mux(stream.encode(None))
+    return file.getvalue()
+
+
+def _view(found: VideoDiscovery, path: Path, i: int, instants: range) -> Iterator[Image]:
+    """What one camera saw at these instants, with what it would see of the law; small."""
+    camera = found.rig.cameras[i]
+    targets = np.split(found.fitted, found.targets, axis=1)
+    pixels = np.stack([camera.project(x) for x in targets])
+    spread = float(np.sqrt(np.nanmean((found.tracks[i] - np.hstack(list(pixels))) ** 2)))
+    width, height = camera.image_size
+    scale = _HEIGHT / height
+    size = 2 * round(width * scale / 2), _HEIGHT
+    numbers = [found.lags.frame_at(i, k) for k in instants]
+    known = sorted({number for number in numbers if number >= 0})
+    frames = zip(known, pick_frames(path, known), strict=False)
+    grey = np.full((_HEIGHT, size[0], 3), 128, np.uint8)
+    now, image = -1, grey
+    for j, number in enumerate(numbers):
+        while now < number:
+            now, frame = next(frames, (number, None))
+            image = grey if frame is None else _small(frame, size)
+        shown = image if number >= 0 else grey
+        for trail in pixels[:, instants[max(j - _TRAIL, 0)] : instants[j] + 1]:
+            shown = _drawn(shown, (trail + 0.5) * scale - 0.5, spread * scale)
+        yield shown
+
+
+def _small(frame: Image, size: tuple[int, int]) -> Image:
+    return cast("Image", cv2.resize(frame, size, interpolation=cv2.INTER_AREA))
+
+
+def _drawn(image: Image, trail: Floats, spread: float) -> Image:
+    """A frame with the last part of the curve, the tube around it, and a ring at its end."""
+    shown = trail[np.isfinite(trail).all(axis=1)]
+    shown = shown[(np.abs(shown) < 10 * _HEIGHT).all(axis=1)]
+    if not len(shown):
+        return image
+    line = [np.rint(shown).astype(np.int32)[:, None]]
+    width = int(np.clip(2 * _TUBE * spread, 3, _HEIGHT))
+    tube = cv2.polylines(image.copy(), line, False, _CURVE, width, cv2.LINE_AA)
+    drawn = cv2.addWeighted(tube, _FAINT, image, 1 - _FAINT, 0)
+    cv2.polylines(drawn, line, False, _CURVE, 1, cv2.LINE_AA)
+    u, v = line[0][-1, 0].tolist()
+    cv2.circle(drawn, (u, v), 7, (255, 255, 255), 3, cv2.LINE_AA)
+    return cast("Image", cv2.circle(drawn, (u, v), 7, _CURVE, 1, cv2.LINE_AA))
+
+
+# ------------------------------------------------------------------- the page to show the target on
+
+
+def write_pick_page(paths: Sequence[str | os.PathLike], out: str | os.PathLike) -> Path:
+    """Write the page on which the target of these videos is shown.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        Videos, see `read_video`.
+    out : path
+        Of the page; an earlier one is replaced.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        If a video is missing or none, or another file is at `out`.
+    """
+    out = check_page("out", out, "pick.html")
+    text = page("pick.html", videos=[_video(Path(path)) for path in paths])
+    write_files({out: text.encode()})
+    return out
+
+
+def _video(path: Path) -> dict[str, object]:
+    """Name and size of a video, and frames spread through it."""
+    info = video_info(path)
+    numbers = np.unique(np.linspace(0, info.frames - 1, FRAMES).round().astype(int)).tolist()
+    shrunk = min(1.0, _LONGEST / max(info.size))
+    frames = []
+    for number, image in zip(numbers, pick_frames(path, numbers), strict=False):
+        small = cv2.resize(image, None, fx=shrunk, fy=shrunk, interpolation=cv2.INTER_AREA)
+        _, packed = cv2.imencode(".jpg", small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+        frames.append({"number": number, "image": base64.b64encode(packed.tobytes()).decode()})
+    width, height = info.size
+    return {"name": path.name, "width": width, "height": height, "frames": frames}
