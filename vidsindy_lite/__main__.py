@@ -15,18 +15,16 @@ from . import __version__
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
-    typed: dict[str, str] = {}
-    kept = _KEPT
+    options = argparse.Namespace(typed={}, kept=_KEPT)  # until it is known which command it is
     try:
-        options = _parser().parse_args(arguments)
-        typed, kept = options.typed, options.kept
-        return options.command(options)
+        _parser().parse_args(arguments, options)
+        return options.work(options)
     except KeyboardInterrupt as stop:
-        print(f"\nstopped; {str(stop) or kept}", file=sys.stderr)
+        print(f"\nstopped; {str(stop) or options.kept}", file=sys.stderr)
         return 130
     except (ValueError, OSError) as error:
         name, colon, rest = str(error).partition(":")
-        name = typed.get(name.partition("[")[0], name)
+        name = options.typed.get(name.partition("[")[0], name)
         print(f"error: {name}{colon}{rest}", file=sys.stderr)
         return 2
 
@@ -51,7 +49,8 @@ def _parser() -> argparse.ArgumentParser:
         )
         for option, settings in command.options.items():
             one.add_argument(option, **settings)
-        one.set_defaults(command=command.work, typed=command.typed, kept=command.kept)
+        usual = one.get_default
+        one.set_defaults(work=command.work, typed=command.typed, kept=command.kept, usual=usual)
     return parser
 
 
@@ -90,10 +89,12 @@ def _discover(options: argparse.Namespace) -> int:
     """
     from .cameras import Rig, list_lags
     from .companion.report import PAGE, check_folder_is_free, write_refusal, write_report
-    from .dynamics import check_library
+    from .dynamics import Library, check_library
     from .pipeline import Refused, Stopped
     from .vision import check_detector
 
+    if options.library is not None:
+        options.library = Library.parse(options.library)
     if bool(options.videos) == bool(options.tracks):
         raise ValueError("videos: give either one video per camera, or --tracks")
     if options.individual is not None and not options.tracks:
@@ -106,24 +107,24 @@ def _discover(options: argparse.Namespace) -> int:
     if options.rig is None and len(options.videos) in (0, 2):
         raise ValueError("rig: must be given for tracks or two videos, got none")
     for name in _OF_A_RIG if alone else _OF_ONE_VIDEO:
-        if (value := getattr(options, name)) != COMMANDS["discover"].default(name):
+        if (value := getattr(options, name)) != options.usual(name):
             rule = f"must be given with {'several videos' if alone else 'one video alone'}"
             raise ValueError(f"{name}: {rule}, got {value}")
     rig, videos = Rig.load(options.rig) if options.rig else None, options.videos or None
+    told = {"seed": options.seed, "order": options.order}
     if alone:
-        asked = ("degree", *_OF_ONE_VIDEO)
-        told = {name: value for name in asked if (value := getattr(options, name)) is not None}
+        told |= {name: getattr(options, name) for name in ("degree", *_OF_ONE_VIDEO)}
     else:
-        told = {
+        told |= {
             "rig file": options.rig or "none",
             "library": str(check_library(options.degree, options.library)),
             "origin": options.origin, "orientation": options.orientation,
             "lags": "learned" if options.lag is None else options.lag,
+            "targets": None if options.targets == 1 else options.targets,
         }  # fmt: skip
-        told |= {"targets": options.targets} if options.targets != 1 else {}
-    told = {"seed": options.seed, "order": options.order} | told
     told |= {"detector": options.detector} if videos else {"tracks": ", ".join(options.tracks)}
-    told |= {} if options.fps is None else {"frames in a unit of time": options.fps}
+    told["frames in a unit of time"] = options.fps
+    told = {name: value for name, value in told.items() if value is not None}
     try:
         found = _found(options, rig, alone)
     except (Refused, Stopped) as refused:
@@ -322,40 +323,26 @@ class _Parser(argparse.ArgumentParser):
         if told:
             known = told[3].replace("'", "")
             message = f"{told[1]}must be one of {known}, got {told[2]}"
-        for kind, rule in (("int", "an integer"), ("float", "a number")):
+        for kind, rule in _RULES.items():
             message = message.replace(f"invalid {kind} value: ", f"must be {rule}, got ")
         raise ValueError(message.removeprefix("argument ").removeprefix("--"))
 
 
-def _as_numbers(text: str) -> list[float]:
+def numbers(text: str) -> list[float]:
     """Numbers with commas between them."""
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"must be numbers with commas between them, got {text!r:.60}"
-        ) from None
+    return [float(part) for part in text.split(",")]
 
 
-def _as_library(text: str) -> Any:
-    """A library of terms."""
-    from .dynamics import Library
-
-    try:
-        return Library.parse(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error).removeprefix("library: ")) from None
-
-
-def _as_size(text: str) -> tuple[int, int]:
+def size(text: str) -> tuple[int, int]:
     """Width and height in pixels."""
-    try:
-        width, height = text.split("x")
-        return int(width), int(height)
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"must be two integers like 1920x1080, got {text!r:.60}"
-        ) from None
+    width, height = text.split("x")
+    return int(width), int(height)
+
+
+_RULES = {
+    "int": "an integer", "float": "a number", "numbers": "numbers with commas between them",
+    "size": "two integers like 1920x1080",
+}  # fmt: skip
 
 
 def _choice(default: str, known: Sequence[str], what: str) -> dict[str, Any]:
@@ -391,10 +378,6 @@ class _Command(NamedTuple):
     typed: dict[str, str] = {}
     kept: str = _KEPT
 
-    def default(self, name: str) -> Any:
-        """What an option is if it is not given."""
-        return self.options[f"--{name.replace('_', '-')}"].get("default")
-
 
 COMMANDS = {
     "discover": _Command(_discover, "from your own videos and a rig file to a report on the law", {
@@ -412,7 +395,7 @@ COMMANDS = {
         ),
         "--length": _words(
             "U1,V1,U2,V2,METRES", "of one video: two marks in its first frame, pixels, and how far "
-            "they are apart in the plane of the motion", type=_as_numbers
+            "they are apart in the plane of the motion", type=numbers
         ),
         "--length-error": _words(
             "SHARE", "standard error of that length, as a share of it (default: 0.01)",
@@ -420,22 +403,22 @@ COMMANDS = {
         ),
         "--up": _words(
             "DU,DV", "of one video: the vertical in the picture, a direction or two marks, the "
-            "lower one first (default: 0,-1)", type=_as_numbers
+            "lower one first (default: 0,-1)", type=numbers
         ),
         "--corners": _words(
             "U1,V1,...,WIDTH,HEIGHT", "of one video seen askew, in place of --length: the corners "
             "of a rectangle in that plane, from its lower left to its lower right and round, and "
-            "its sides in metres", type=_as_numbers
+            "its sides in metres", type=numbers
         ),
         "--hint": _words(
             "FRAME,U,V,WIDTH,HEIGHT", "of one video: a frame and a box around the target in it",
-            type=_as_numbers
+            type=numbers
         ),
         "--out": _words("DIR", "folder of the report (default: report)", default="report"),
         "--lag": _words(
             "0,L2,L3", "by how many frames of the first video each one starts later; the default "
             "is to learn it (a first number below zero needs the form --lag=-7,0,0)",
-            type=_as_numbers
+            type=numbers
         ),
         "--fps": _words(
             "RATE", "frames of each video in one unit of time of the equations (default: as the "
@@ -446,7 +429,7 @@ COMMANDS = {
             "TERMS", "in place of --degree: polynomial(N), fourier(N) with the sines and cosines "
             "of the coordinates, rational(N) with denominators, or a sum such as "
             "'polynomial(1) + fourier(1)'; then what is known, as in "
-            "'polynomial(2); x: y = 10, z = 0' (?: to be found; ...: all others)", type=_as_library
+            "'polynomial(2); x: y = 10, z = 0' (?: to be found; ...: all others)"
         ),
         "--order": _choice(
             "auto", ("1", "2", "auto"),
@@ -483,14 +466,14 @@ COMMANDS = {
             "perspective (default), or orthographic for far cameras with long lenses"
         ),
         "--size": _words(
-            "WxH", "of the videos in pixels (default: 1920x1080)", type=_as_size,
+            "WxH", "of the videos in pixels (default: 1920x1080)", type=size,
             default=(1920, 1080)
         ),
         "--output": _words("FILE", "write it there, in UTF-8 (default: print it)"),
     }, {"image_size": "size"}),
     "rig-import": _Command(_rig_import, "a rig file from the calibration of another tool", {
         "files": _words("FILE", "calibrations, in the order of the videos", nargs="+"),
-        "--size": _words("WxH", "of the videos in pixels, if the files do not say", type=_as_size),
+        "--size": _words("WxH", "of the videos in pixels, if the files do not say", type=size),
         "--output": _words("FILE", "write it there, in UTF-8 (default: print it)"),
     }, {"image_size": "size", "paths": "files"}),
     "run": _Command(_run, "execute the notebooks, regenerate figures and tables", {
