@@ -171,13 +171,13 @@ def test_doubts_of_the_observation_are_doubts_of_the_trial(this_film, monkeypatc
 def test_data_depend_on_system_condition_level_and_number_alone():
     x = SYSTEMS["Lorenz"].trajectory(FRAMES)[1]
     trial = Trial("Lorenz", "noise", 0.1, 3, frames=FRAMES)
-    expected = trial.corrupt(x)
+    expected = trial.corrupt_each([x])[0]
     np.random.default_rng(0).random(100)
-    Trial("SprottF", "noise", 0.1, 3).corrupt(x)  # what ran before does not matter
+    Trial("SprottF", "noise", 0.1, 3).corrupt_each([x])  # what ran before does not matter
     same = replace(trial, method="PySINDy", source="path")
-    np.testing.assert_array_equal(same.corrupt(x), expected)
+    np.testing.assert_array_equal(same.corrupt_each([x])[0], expected)
     for other in ({"trial": 4}, {"level": 0.15}, {"system": "SprottF"}):
-        assert not np.array_equal(replace(trial, **other).corrupt(x), expected)
+        assert not np.array_equal(replace(trial, **other).corrupt_each([x])[0], expected)
 
 
 def test_every_method_gets_the_same_data_and_the_number_as_its_seed(no_videos, monkeypatch):
@@ -214,7 +214,7 @@ def test_result_of_gauss_newton_equals_a_direct_computation(no_videos):
     trial = Trial("SprottE", "noise", 0.02, 2, source="truth", frames=FRAMES)
     truth = SYSTEMS["SprottE"].shift(REFERENCE_OFFSET)
     t, x = truth.trajectory(FRAMES)
-    found = discover(t, trial.corrupt(x))
+    found = discover(t, trial.corrupt_each([x])[0])
     result = run_trial(trial)
     direct = score(found, truth)
     np.testing.assert_array_equal(result.law.coefficients, found.coefficients)

@@ -24,17 +24,10 @@ import pysindy
 from pysindy.optimizers import BaseOptimizer
 from sklearn import config_context
 
+from .. import dynamics
 from ..arrays import Floats
 from ..checks import check_integer
-from ..dynamics import (
-    PolynomialSystem,
-    Trajectory,
-    check_trajectory,
-    cut,
-    smooth,
-    typical_step,
-    variable_names,
-)
+from ..dynamics import PolynomialSystem, Trajectory
 
 THRESHOLDS = tuple(np.geomspace(0.01, 10, 13))
 """Grid of thresholds: least magnitude of a coefficient, in the units of the data."""
@@ -140,7 +133,7 @@ def weak(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> PolynomialSyst
     ----------
     D. A. Messenger, D. M. Bortz, Multiscale Model. Simul. 19, 1474 (2021).
     """
-    t, x = check_trajectory(t, x)
+    t, x = dynamics.check_trajectory(t, x)
     rows = partial(_weak_rows, half_width=WEAK_WIDTH / 2 * (t[-1] - t[0]), total=len(t))
     with _numpy_seed(seed):
         return _discover(t, x, degree, rows, _least_squares)
@@ -182,16 +175,16 @@ def candidates(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> list[Pol
     t, x, degree, seed
         See `stlsq` and `model_a`.
     """
-    t, x = check_trajectory(t, x)
+    t, x = dynamics.check_trajectory(t, x)
     library = pysindy.PolynomialLibrary(degree=degree).fit(x)
-    segments = _segments((t, x), LONGEST_STEP * typical_step([(t, x)]))
+    segments = _segments((t, x), LONGEST_STEP * dynamics.typical_step([(t, x)]))
     found = [
         _fit(_least_squares(threshold), rows)
         for rows in (_difference_rows(segments, library), _spline_rows(segments, library, seed))
         for threshold in THRESHOLDS
     ]
     distinct = {coefficients.tobytes(): coefficients for coefficients in found}
-    names = variable_names(x.shape[1])
+    names = dynamics.variable_names(x.shape[1])
     return [PolynomialSystem(names, library.powers_, one) for one in distinct.values()]
 
 
@@ -203,10 +196,10 @@ def _discover(
     optimizer: Callable[[float], BaseOptimizer],
 ) -> PolynomialSystem:
     """Choose a threshold on the last part of the record and fit all of it."""
-    t, x = check_trajectory(t, x)
+    t, x = dynamics.check_trajectory(t, x)
     library = pysindy.PolynomialLibrary(degree=degree).fit(x)
     split = int(TRAINING * len(t))
-    step = LONGEST_STEP * typical_step([(t, x)])
+    step = LONGEST_STEP * dynamics.typical_step([(t, x)])
     everything, training, held_out = (
         rows(_segments((t[part], x[part]), step), library)
         for part in (slice(None), slice(split), slice(split, None))
@@ -214,12 +207,12 @@ def _discover(
     errors = np.array([_error(_fit(optimizer(h), training), held_out) for h in THRESHOLDS])
     chosen = THRESHOLDS[np.flatnonzero(errors <= TOLERANCE * errors.min())[-1]]
     coefficients = _fit(optimizer(chosen), everything)
-    return PolynomialSystem(variable_names(x.shape[1]), library.powers_, coefficients)
+    return PolynomialSystem(dynamics.variable_names(x.shape[1]), library.powers_, coefficients)
 
 
 def _segments(record: Trajectory, longest_step: float) -> list[Trajectory]:
     """The stretches between gaps that are long enough to be differentiated."""
-    segments = [s for s in cut(record, longest_step) if len(s[0]) >= SHORTEST_SEGMENT]
+    segments = [s for s in dynamics.cut(record, longest_step) if len(s[0]) >= SHORTEST_SEGMENT]
     if not segments:
         raise ValueError(
             f"x: must hold {SHORTEST_SEGMENT} samples in a row, both in its first {TRAINING:.0%} "
@@ -259,7 +252,7 @@ def _difference_rows(segments: Sequence[Trajectory], library: pysindy.Polynomial
 def _spline_rows(
     segments: Sequence[Trajectory], library: pysindy.PolynomialLibrary, seed: int
 ) -> Rows:
-    splines = smooth(segments, np.random.default_rng(seed)).splines
+    splines = dynamics.smooth(segments, np.random.default_rng(seed)).splines
     curves = [spline(times) for spline, (times, _) in zip(splines, segments, strict=True)]
     slopes = [spline(times, 1) for spline, (times, _) in zip(splines, segments, strict=True)]
     return np.asarray(library.transform(np.concatenate(curves))), np.concatenate(slopes)

@@ -37,7 +37,7 @@ import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from itertools import product
 from pathlib import Path
 from types import CodeType
@@ -172,17 +172,16 @@ def _coarse(flow: Benchmark, t: Floats, spread: Floats, rng: np.random.Generator
     )
 
 
-def _kicked(level: float) -> Motion:
-    def path(flow: Benchmark, t: Floats, spread: Floats, rng: np.random.Generator) -> Floats:
-        return corruption.kicked_path(flow, t, flow.x0, level * spread / flow.period**0.5, rng)
-
-    return path
+def _kicked(
+    level: float, flow: Benchmark, t: Floats, spread: Floats, rng: np.random.Generator
+) -> Floats:
+    return corruption.kicked_path(flow, t, flow.x0, level * spread / flow.period**0.5, rng)
 
 
 MOTIONS: dict[str, Motion] = {
     "coarse steps": _coarse,
-    "kicks 1 %": _kicked(0.01),
-    "kicks 5 %": _kicked(0.05),
+    "kicks 1 %": partial(_kicked, 0.01),
+    "kicks 5 %": partial(_kicked, 0.05),
 }
 """Motions that are not quite those of the law: a careless integrator, kicks in percent of the
 spread a period."""

@@ -30,19 +30,10 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array, vstack
 from scipy.sparse.linalg import spsolve
 
+from .. import dynamics
 from ..arrays import Floats, Ints
 from ..checks import check_integer, check_times
-from ..dynamics import (
-    DEGREE,
-    PolynomialSystem,
-    Units,
-    check_trajectory,
-    clamped_knots,
-    local_basis,
-    monomial_exponents,
-    monomials,
-    variable_names,
-)
+from ..dynamics import DEGREE, PolynomialSystem, monomials
 
 ROUGHNESS = 1e-4
 """Weight of the second differences in the first curve: enough to carry it across gaps."""
@@ -170,8 +161,8 @@ def spline_ado(
         there are fewer samples than candidate terms, or a hyperparameter is too small.
     """
     chosen = SplineADOSettings(**settings)
-    kept, seen = check_trajectory(t, x)
-    exponents = monomial_exponents(seen.shape[1], degree)
+    kept, seen = dynamics.check_trajectory(t, x)
+    exponents = dynamics.monomial_exponents(seen.shape[1], degree)
     if len(kept) < len(exponents):
         raise ValueError(f"x: must hold at least {len(exponents)} samples, got {len(kept)}")
     if not (np.ptp(seen, axis=0) > 0).all():
@@ -229,7 +220,7 @@ class _Fit:
         self.history: list[dict[str, float]] = []
         spans = max(1, round(settings.knots_per_sample * (len(t) - 1)))
         breakpoints = np.linspace(t[0], t[-1], spans + 1)
-        knots = clamped_knots(breakpoints)
+        knots = dynamics.clamped_knots(breakpoints)
         seen = ~np.isnan(x).any(axis=1)
         centre, scale = x[seen].mean(axis=0), x[seen].std(axis=0)
         self.data = (x[seen] - centre) / scale
@@ -238,14 +229,14 @@ class _Fit:
         self.control_points = _first_curve(samples, self.data)
         # Spans that hold samples, and their neighbours: there the law is asked for.
         held = np.zeros(spans, dtype=bool)
-        held[local_basis(knots, t[seen])[0]] = True
+        held[dynamics.local_basis(knots, t[seen])[0]] = True
         held |= np.append(held[1:], False) | np.append(False, held[:-1])
         # The same number in every span: random in time, and all spans are treated alike.
         fractions = rng.uniform(size=(spans, settings.collocation_per_knot)).T
         times = (breakpoints[:-1] + fractions * np.diff(breakpoints))[:, held].ravel()
         nodes, slopes = _sampling(knots, times), _sampling(knots, times, order=1)
         pace = float(1 / (slopes @ self.control_points).std(axis=0).mean())
-        self.units = Units(centre, scale, time=pace)
+        self.units = dynamics.Units(centre, scale, time=pace)
         self.basis = csr_array(vstack([samples, nodes, slopes * pace]))
         self.turned = csr_array(self.basis.T)
         self.parts = [len(self.data), len(self.data) + len(times)]
@@ -318,7 +309,7 @@ class _Fit:
 
     def result(self) -> SplineADOLaw:
         """Back to the units of the data, without the offset (paper: Eq. 10)."""
-        names, centre = variable_names(len(self.offset)), self.units.point(self.offset)
+        names, centre = dynamics.variable_names(len(self.offset)), self.units.point(self.offset)
         curve = self.units.point(self.everywhere @ self.control_points + self.offset)
         coefficients = self.coefficients * self.units.factors(self.exponents)
         native = PolynomialSystem(names, self.exponents, coefficients)
@@ -331,7 +322,7 @@ class _Fit:
 
 def _sampling(knots: Floats, t: Floats, order: int = 0) -> csr_array:
     """A spline or its derivative at times as a matrix (n, r), with four entries a row."""
-    first, values = local_basis(knots, t, order)
+    first, values = dynamics.local_basis(knots, t, order)
     rows, columns = np.arange(len(t)).repeat(DEGREE + 1), first[:, None] + np.arange(DEGREE + 1)
     shape = len(t), len(knots) - DEGREE - 1
     return csr_array((values.ravel(), (rows, columns.ravel())), shape)

@@ -334,12 +334,11 @@ class Trial:
         """The film that the path comes from."""
         return FilmTask(self.system, self.trial, self.frames)
 
-    def corrupt(self, x: Floats) -> Floats:
-        """Do to a path what the condition says; the same whatever the method and the source."""
-        return self.corrupt_each([x])[0]
-
     def corrupt_each(self, paths: Sequence[Floats]) -> list[Floats]:
-        """Do what the condition says to several paths or tracks, to each by its own draw."""
+        """Do what the condition says to paths or tracks, to each by its own draw.
+
+        It is the same whatever the method and the source.
+        """
         if self.condition == "clean":
             return list(paths)
         # The names and numbers themselves are the entropy: no trial depends on any other.
@@ -462,9 +461,9 @@ def _path(trial: Trial) -> TrialPath:
     filmed = film_result(trial.film)
     if trial.source == "truth":
         path = filmed.truth.simulate(filmed.t, np.array(filmed.truth.x0))
-        return TrialPath(filmed.t, trial.corrupt(path), None, ())
+        return TrialPath(filmed.t, trial.corrupt_each([path])[0], None, ())
     if trial.source == "path":
-        path = trial.corrupt(filmed.x)
+        (path,) = trial.corrupt_each([filmed.x])
         return TrialPath(filmed.t, path, filmed.systematic, filmed.warnings)
     whole = trial.source == "detector"
     tracks = trial.corrupt_each(filmed.detected if whole else filmed.tracks)
