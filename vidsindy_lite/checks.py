@@ -23,10 +23,8 @@ from .arrays import Floats
 
 T = TypeVar("T")
 
-FARTHEST_PIXEL = 1e100
-"""Largest coordinate of a track: the squares of larger ones are no numbers any more."""
 FARTHEST = 1e100
-"""Largest value of a state, for the same reason."""
+"""Largest coordinate of a track or a state: the squares of larger ones are no numbers any more."""
 LARGEST_SIDE = 32768
 """Pixels of a camera's image, in width and in height: no sensor has more."""
 LARGEST_INTEGER = 2**63 - 1
@@ -167,9 +165,9 @@ def check_tracks(tracks: Sequence[ArrayLike], cameras: int | None = None) -> lis
     checked = [check_rows(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
     for i, track in enumerate(checked):
         largest = np.nanmax(np.abs(track), initial=0.0)
-        if largest > FARTHEST_PIXEL:
+        if largest > FARTHEST:
             raise ValueError(
-                f"tracks[{i}]: must be pixels of at most {FARTHEST_PIXEL:g}, got {largest:g}"
+                f"tracks[{i}]: must be pixels of at most {FARTHEST:g}, got {largest:g}"
             )
     return checked
 

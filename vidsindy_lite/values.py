@@ -1,6 +1,5 @@
 """Values as trees that JSON holds, number by number, and back: arrays, dataclasses, collections."""
 
-import base64
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from types import NoneType, UnionType
@@ -36,9 +35,6 @@ def encoded(value: Any, name: Callable[[type], str], named: tuple[Any, ...] = ()
             value = value.item()
         if value is None or isinstance(value, bool | int | float | str):
             return value
-        if isinstance(value, np.ndarray) and value.dtype == np.uint8:  # such as an image
-            pixels = base64.b64encode(value.tobytes()).decode()
-            return {"type": "bytes", "shape": list(value.shape), "values": pixels}
         if isinstance(value, np.ndarray) and KINDS.get(value.dtype.kind) == value.dtype:
             shape = {} if value.size else {"shape": list(value.shape)}
             return {"type": "array", "dtype": value.dtype.kind, "values": value.tolist(), **shape}
@@ -76,9 +72,6 @@ def decoded(tree: Any, build: Callable[[str, dict[str, Any]], Any]) -> Any:
     if not isinstance(tree, dict):
         return tree
     kind = tree["type"]
-    if kind == "bytes":
-        pixels = np.frombuffer(base64.b64decode(tree["values"]), np.uint8)
-        return pixels.reshape(tree["shape"]).copy()
     if kind == "array":
         values: np.ndarray = np.array(tree["values"], dtype=KINDS[tree["dtype"]])
         return values.reshape(tree.get("shape", values.shape))

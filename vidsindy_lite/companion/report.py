@@ -205,11 +205,18 @@ def write_refusal(
         "tracks": [as_json(track, "tracks") for track in refused.tracks],
         "share_of_frames_seen": [float(np.isfinite(t).all(axis=1).mean()) for t in refused.tracks],
     }  # fmt: skip
+    # In the middle of what is seen of the target in each view.
+    seen = [np.flatnonzero(np.isfinite(track).all(axis=1)) for track in refused.tracks]
+    shown = [int(k[len(k) // 2]) if len(k) else 0 for k in seen]
     sizes = [camera.image_size for camera in rig.cameras] if rig else [(1, 1)] * len(names)
+    images = [
+        np.full((height, width, 3), 255, np.uint8) if paths is None else read_frame(paths[i], k)
+        for i, ((width, height), k) in enumerate(zip(sizes, shown, strict=True))
+    ]
     # See `_figures`.
     plt.draw_if_interactive()
     with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
-        look = _encoded(_overview(refused.tracks, paths, names, sizes))
+        look = _encoded(_look(images, names, shown, refused.tracks, shown))
     frames = np.arange(max(len(track) for track in refused.tracks), dtype=float)
     files = _data(content, frames, refused.tracks, "frame")
     text = page("refusal.html", look=look, what=STEPS[refused.step], data_file=DATA, **content)
@@ -291,8 +298,8 @@ def summary(
         "status": found.status,
         "warnings": list(found.warnings),
         "law": {
-            "data": _law(law, "data", np.zeros(law.system.d), np.zeros(law.system.d)),
-            "native": _law(law, "native", law.offset, law.offset_errors),
+            "data": _law(law, "data"),
+            "native": _law(law, "native"),
             "orientation": law.orientation,
             "swing": None if found.swing is None else _swing(found.swing),
         },
@@ -325,13 +332,13 @@ def _shot(found: VideoDiscovery, paths: Sequence[str | Path] | None, i: int) -> 
     return VideoInfo(len(found.tracks[i]), rate, found.rig.cameras[i].image_size)
 
 
-def _law(found: Discovery, frame: str, origin: Floats, errors: Floats) -> dict[str, object]:
+def _law(found: Discovery, frame: str) -> dict[str, object]:
     """One form of the law: as text, and term by term."""
-    law, deviations = (
-        (found.system, found.standard_errors)
-        if frame == "data"
-        else (found.native, found.native_standard_errors)
-    )
+    law, deviations = found.native, found.native_standard_errors
+    origin, errors = found.offset, found.offset_errors
+    if frame == "data":
+        law, deviations = found.system, found.standard_errors
+        origin = errors = np.zeros(law.d)
     terms = [
         {
             "equation": side, "term": law.terms[row],
@@ -402,7 +409,11 @@ def _figures(
         yield "path", _encoded(plot_path(t, curves, "not seen"))
         seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
         if seen.any() and paths is not None:
-            yield "look", _encoded(_first_look(found, paths, int(seen.argmax())))
+            instant = int(seen.argmax())
+            shown = [found.lags.frame_at(i, instant) for i in range(len(paths))]
+            images = [read_frame(path, frame) for path, frame in zip(paths, shown, strict=True)]
+            names = _names(paths, len(paths))
+            yield "look", _encoded(_look(images, names, shown, found.tracks, instant))
         if len(found.rig.cameras) > 1:
             yield "rig", _encoded(plot_rig(found.rig, x))
             missed = [stacked(one, 2) for one in found.residuals]
@@ -410,29 +421,16 @@ def _figures(
         yield "plateaus", _encoded(found.discovery.plot_path())
 
 
-def _first_look(found: VideoDiscovery, paths: Sequence[str | Path], instant: int) -> Figure:
-    """The frames of all videos at one instant of the first."""
-    places = [(Path(path), found.lags.frame_at(i, instant)) for i, path in enumerate(paths)]
-    images = [read_frame(path, frame) for path, frame in places]
-    titles = [f"{_short(path.name, i)}, frame {k}" for i, (path, k) in enumerate(places)]
-    return plot_frames(images, titles, [stacked(track, 2) for track in found.tracks], instant)
-
-
-def _overview(
-    tracks: Sequence[Floats],
-    paths: Sequence[str | Path] | None,
+def _look(
+    images: Sequence[Image],
     names: Sequence[str],
-    sizes: Sequence[tuple[int, int]],
+    frames: Sequence[int],
+    tracks: Sequence[Floats],
+    index: int | Sequence[int],
 ) -> Figure:
-    """A frame in the middle of what is seen of the target in each view, with its whole track."""
-    seen = [np.flatnonzero(np.isfinite(track).all(axis=1)) for track in tracks]
-    shown = [int(k[len(k) // 2]) if len(k) else 0 for k in seen]
-    images = [
-        np.full((height, width, 3), 255, np.uint8) if paths is None else read_frame(paths[i], k)
-        for i, ((width, height), k) in enumerate(zip(sizes, shown, strict=True))
-    ]
-    titles = [f"{_short(name, i)}, frame {shown[i]}" for i, name in enumerate(names)]
-    return plot_frames(images, titles, [stacked(track, 2) for track in tracks], shown)
+    """A frame of each view, with its whole track over it."""
+    titles = [f"{_short(name, i)}, frame {frames[i]}" for i, name in enumerate(names)]
+    return plot_frames(images, titles, [stacked(track, 2) for track in tracks], index)
 
 
 def _short(name: str, i: int) -> str:
@@ -497,21 +495,16 @@ def _view(found: VideoDiscovery, path: Path, i: int, instants: range) -> Iterato
     size = 2 * round(width * scale / 2), _HEIGHT
     numbers = [found.lags.frame_at(i, k) for k in instants]
     known = sorted({number for number in numbers if number >= 0})
-    frames = zip(known, pick_frames(path, known), strict=False)
+    small = {
+        number: cast("Image", cv2.resize(frame, size, interpolation=cv2.INTER_AREA))
+        for number, frame in zip(known, pick_frames(path, known), strict=False)
+    }
     grey = np.full((_HEIGHT, size[0], 3), 128, np.uint8)
-    now, image = -1, grey
     for j, number in enumerate(numbers):
-        while now < number:
-            now, frame = next(frames, (number, None))
-            image = grey if frame is None else _small(frame, size)
-        shown = image if number >= 0 else grey
+        shown = small.get(number, grey)
         for trail in pixels[:, instants[max(j - _TRAIL, 0)] : instants[j] + 1]:
             shown = _drawn(shown, (trail + 0.5) * scale - 0.5, spread * scale)
         yield shown
-
-
-def _small(frame: Image, size: tuple[int, int]) -> Image:
-    return cast("Image", cv2.resize(frame, size, interpolation=cv2.INTER_AREA))
 
 
 def _drawn(image: Image, trail: Floats, spread: float) -> Image:
