@@ -4,6 +4,7 @@ import ast
 import io
 import json
 import re
+from functools import cache
 
 import jupytext
 import nbformat
@@ -54,6 +55,16 @@ LENGTH = lambda path: -path.stat().st_size  # noqa: E731
 VOLATILE = re.compile(r"0x[0-9a-f]{6,}|/(tmp|home|root|Users)/|\\Users\\")
 
 
+@cache  # every gate reads all of them
+def parsed(text):
+    return jupytext.reads(text, "py:percent")
+
+
+def source_half(path):
+    """The .py half of a pair as a notebook."""
+    return parsed(path.read_text("utf-8"))
+
+
 def executed_half(path):
     """The .ipynb beside a .py; no cells if there is none, which `pair_problems` reports."""
     executed = path.with_suffix(".ipynb")
@@ -71,7 +82,7 @@ def pair_problems(path):
     def marks(metadata):
         return metadata.get("tags", []), metadata.get("jupyter", {})
 
-    ours, theirs = cells(jupytext.read(path)), cells(executed_half(path))
+    ours, theirs = cells(source_half(path)), cells(executed_half(path))
     problems = [] if len(ours) == len(theirs) else [f"{len(ours)} cells beside {len(theirs)}"]
     for index, (one, other) in enumerate(zip(ours, theirs, strict=False)):
         if one != other:
@@ -105,7 +116,7 @@ def count_lines(source):
 
 def anatomy_problems(path):
     """What a notebook of ours has to have, and must not."""
-    notebook = jupytext.read(path)
+    notebook = source_half(path)
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]
     parameters = [cell for cell in code if "parameters" in cell.metadata.get("tags", [])]
     problems = []
@@ -137,7 +148,7 @@ def anatomy_problems(path):
 
 def import_problems(path):
     """Places in the package that a notebook imports from, beside the four that it may."""
-    code = "\n".join(cell.source for cell in jupytext.read(path).cells if cell.cell_type == "code")
+    code = "\n".join(cell.source for cell in source_half(path).cells if cell.cell_type == "code")
     found = set()
     for node in ast.walk(ast.parse(code)):
         if isinstance(node, ast.ImportFrom):
@@ -150,7 +161,7 @@ def import_problems(path):
 
 def story_problems(path):
     """What the prose of a notebook lacks, and claims that nothing computes."""
-    notebook = jupytext.read(path)
+    notebook = source_half(path)
     prose = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
     code = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "code")
     places = [re.search(section, prose, re.MULTILINE) for section in SECTIONS]

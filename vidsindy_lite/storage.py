@@ -306,8 +306,13 @@ def code_hash(without: tuple[str, ...] = ()) -> str:
         left_out = {*place.parts[:-1], place.stem} & {*without, "__pycache__"}
         if left_out or not file.is_file() or file.suffix == ".pyc":
             continue
-        content = file.read_bytes()
-        if file.suffix == ".py":
-            content = ast.dump(ast.parse(content)).encode()
+        content = _content(file, file.stat().st_mtime_ns)
         digest.update(f"{place.as_posix()}\0{len(content)}\0".encode() + content)
     return digest.hexdigest()[:16]
+
+
+@cache  # a run hashes before and after each notebook, and reading all code takes a second
+def _content(file: Path, written: int) -> bytes:
+    """What counts of a file as it was written at a time."""
+    content = file.read_bytes()
+    return ast.dump(ast.parse(content)).encode() if file.suffix == ".py" else content
