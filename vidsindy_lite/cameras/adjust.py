@@ -95,6 +95,7 @@ STEPS = 60
 _LARGEST = 50.0  # logarithm of a scale: a step that leads there is not taken
 _TANGENTIAL = 0.1  # p1 and p2 of a lens, in units of k1
 _OUTLIER = 6.0  # sigma
+_USED = 0.5  # weight of a frame that holds no outlier
 _FINEST = 1e-6  # pixels; noise below that is rounding
 _PRIOR_NOISE = 0.02  # pixels; no track is better than that beside a measurement
 _SETTLED = 1e-11  # pixels, or ...
@@ -306,6 +307,11 @@ class Adjustment:
         if self.timed and len(weights):  # ... or is beside one, as interpolation carries a part
             weights = minimum_filter1d(weights, 2 * _BESIDE + 1)
         return np.where(np.isfinite(self.misses).any(axis=1), weights, 0.0)
+
+    @property
+    def used(self) -> Bools:
+        """Instants that hold no outlier, (n,)."""
+        return self.weights > _USED
 
     @property
     def free(self) -> Bools:
