@@ -34,11 +34,9 @@ direction the larger of both counts.
 **Why views do not agree.** `explain` frees one thing at a time. Residuals of a right rig are the
 errors of the tracks. A wrong normal, lens or clock leaves more, which follows the motion; how large
 it may be without a word depends on these errors, and not on a fixed number of pixels. For each
-cause, with slopes C of the residuals r in it (all that is free anyway projected out), the score g =
-C'r is compared with its covariance, in which residuals that depend on their neighbours count for
-what they are worth:
+cause, the change c of cameras that one step finds with it free is compared with its covariance:
 
-    T = g' Omega^-1 g,      Omega of the residuals that the cause leaves.
+    T = c' S^-1 c,      S as above, of the residuals that the cause leaves.
 
 A cause that stands out is tried: cameras and path are adjusted with it free.
 
@@ -110,7 +108,6 @@ _FLAT = 1e-9  # of the largest pivot; smaller ones leave a point where it is
 _DAMPING = (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2)
 _CHANCE = 1e-6  # of a T that large without a cause
 _TRIED = 5  # of the causes that stand out most
-_DEGENERATE = 1e-3  # share of a slope that nothing else explains; less tells nothing
 _SMOOTH = 0.3  # correlation of a residual with the next; that of noise is zero
 _ROUNDING = 1e-9  # pixels
 LAG, DRIFT = PARTS["lag"][0], PARTS["drift"][0]
@@ -339,7 +336,7 @@ class Adjustment:
 
     @cached_property
     def reduced(self) -> _Reduced:
-        """Misses and their slopes in the free changes, with the points taken out by QR."""
+        """Slopes in the free changes, with the points taken out by QR."""
         seen = np.isfinite(self.misses)[..., None]
         in_change, in_points = (np.where(seen, np.nan_to_num(part), 0.0) for part in self._slopes())
         q, r = np.linalg.qr(in_points)
@@ -350,7 +347,6 @@ class Adjustment:
         of_change, of_misses = (q.swapaxes(1, 2) @ part for part in (in_change, missed))
         return _Reduced(
             in_change - q @ of_change,
-            (missed - q @ of_misses)[..., 0],
             -np.linalg.solve(r, of_misses)[..., 0],
             -np.linalg.solve(r, of_change),
             of_misses[..., 0],
@@ -384,13 +380,21 @@ class Adjustment:
         return root * np.nan_to_num(self.misses), root[..., None] * self.reduced.slopes
 
     @property
+    def system(self) -> tuple[Floats, Floats]:
+        """Linear equations for a step, of residuals and measurements in units of their errors."""
+        (missed, slopes), prior = self.weighed, np.sqrt(self.prior)
+        sigma = max(self.noise, _PRIOR_NOISE)
+        rows = np.vstack((slopes.reshape(-1, len(prior)) / sigma, np.diag(prior)))
+        return rows, -np.append(missed.ravel() / sigma, prior * self.change[self.free])
+
+    @property
     def factor(self) -> Floats:
         """`fitted_factor` of the free changes."""
         return fitted_factor(*self.weighed, self.prior, self.noise)
 
 
 class _Reduced(NamedTuple):
-    """Slopes, (n, 2 m, p), and misses, (n, 2 m), with the points taken out.
+    """Slopes, (n, 2 m, p), with the points taken out.
 
     The points move by `own`, (n, 3), to where they are missed least, and with the changes by
     `follow`, (n, 3, p); a point that its views do not tell stays. `along`, (n, 3), is what of the
@@ -398,7 +402,6 @@ class _Reduced(NamedTuple):
     """
 
     slopes: Floats
-    misses: Floats
     own: Floats
     follow: Floats
     along: Floats
@@ -454,15 +457,12 @@ def adjust(
 
 def _downhill(state: Adjustment) -> tuple[Adjustment | None, float]:
     """The state after a step that lessens the errors, and how far it moved images, pixels."""
-    weights, sigma, reduced = state.weights, max(state.noise, _PRIOR_NOISE), state.reduced
-    free, prior = state.free, np.sqrt(state.prior)
-    root = np.sqrt(weights)[:, None] / sigma
-    rows = np.vstack(((root[..., None] * reduced.slopes).reshape(-1, len(prior)), np.diag(prior)))
-    target = -np.append((root * reduced.misses).ravel(), prior * state.change[free])
-    size = np.sqrt(np.sum(rows**2, axis=0))
+    free, prior, reduced = state.free, np.sqrt(state.prior), state.reduced
+    weights, sigma = state.weights, max(state.noise, _PRIOR_NOISE)
+    rows, target = state.system
+    size = _sizes(rows)
     if not np.isfinite(size).all():
         return None, np.inf
-    size[size == 0] = 1.0
     factor, triangle = np.linalg.qr(rows / size)
     aim = np.append(factor.T @ target, np.zeros(len(size)))
     lags = np.argwhere(free)[:, 1] == LAG
@@ -564,9 +564,9 @@ def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Explanation |
     causes = [c for c in _causes(start) if (c.mask(len(start)) & (errors == 0)).any()]
     footage = Footage.of(tracks)
     near = adjust(footage, start, np.where(errors > 0, errors, np.inf), most=0)
-    sizes = [_sizes(near, errors, cause) for cause in causes]
+    told = [_evidence(near, errors[near.free] > 0, c.mask(len(start))[near.free]) for c in causes]
     # Where views are far apart, and no noise makes it, no test is needed.
-    rank = [explained if far else evidence for evidence, explained in sizes]
+    rank = [explained if far else evidence for evidence, explained in told]
     tried = [causes[k] for k in np.argsort(rank)[::-1][:_TRIED] if rank[k] > (0 if far else 1)]
     best: tuple[float, Explanation] | None = None
     for cause in tried:
@@ -618,38 +618,30 @@ def _near(camera: Camera, about: Floats) -> Camera:
     return NearCamera(about=about, **values)
 
 
-def _sizes(near: Adjustment, errors: Floats, cause: Cause) -> tuple[float, float]:
+def _sizes(rows: Floats) -> Floats:
+    """Lengths of columns, one where they are zero."""
+    size = np.linalg.norm(rows, axis=0)
+    return np.where(size == 0, 1.0, size)
+
+
+def _evidence(near: Adjustment, free: Bools, wanted: Bools) -> tuple[float, float]:
     """T over what chance may make it, zero if it would not matter; pixels that it explains."""
-    missed, slopes = near.weighed
-    free, wanted = errors[near.errors > 0] > 0, cause.mask(len(errors))[near.errors > 0]
-    own = slopes[..., wanted & ~free]
-    flat, target = own.reshape(-1, own.shape[-1]), missed.ravel()
-    size = np.sqrt(np.sum(flat**2, axis=0))
-    flat, size = flat[:, size > 0], size[size > 0]
-    if not size.size:
-        return 0.0, 0.0
-    prior = near.noise / errors[near.errors > 0][free]
-    others = np.vstack((slopes[..., free].reshape(len(flat), -1), np.diag(prior)))
-    padded = np.vstack((flat / size, np.zeros((len(prior), len(size)))))
-    if free.any():
-        solved = np.linalg.lstsq(others, padded, rcond=1e-10)[0]
-        padded = padded - others @ solved
-    left, singular, _ = np.linalg.svd(padded, full_matrices=False)
-    left = left[: len(flat), singular > _DEGENERATE]
-    if not left.shape[1]:
-        return 0.0, 0.0
-    score = left.T @ target
-    rest = (target - left @ score).reshape(missed.shape)
-    each = np.einsum("nmk,nm->nk", left.reshape(*missed.shape, -1), rest)
-    covariance = long_run_covariance(each) * len(each)
-    covariance += _ROUNDING**2 * np.eye(len(covariance))
-    explained = float(np.linalg.norm(score) / np.sqrt(np.isfinite(near.misses).sum()))
+    told, own = free | wanted, (wanted & ~free)[free | wanted]
+    (rows, target), (missed, slopes) = near.system, near.weighed
+    rows, slopes = rows[:, told], slopes[..., told]
+    size = _sizes(rows)
+    step = np.linalg.lstsq(rows / size, target, rcond=1e-10)[0]
+    left = missed + slopes @ (step / size)
+    share = float(np.linalg.norm(left)) / max(float(np.linalg.norm(missed)), 1e-300)
+    factor = fitted_factor(left, slopes, near.prior[told], share * near.noise) * size[:, None]
+    score, _, rank, _ = np.linalg.lstsq(factor[own], step[own], rcond=1e-10)
+    explained = np.sqrt(max(1 - share**2, 0.0) * np.sum(missed**2) / np.isfinite(near.misses).sum())
+    each = np.einsum("nmk,nm->nk", slopes[..., own], left)
     # Bartlett's weights of that width leave as many degrees of freedom (2/3 is their square's
-    # integral) to estimate Omega with: Hotelling's T.
+    # integral) to estimate the covariance with: Hotelling's T.
     degrees = 1.5 * len(each) / (bandwidth(each) + 1)
-    rest_degrees = degrees - len(score) + 1
+    rest_degrees = degrees - rank + 1
     if explained < FINE or rest_degrees <= 0:
         return 0.0, explained
-    chance = float(fdtri(len(score), rest_degrees, 1 - _CHANCE))
-    limit = chance * len(score) * degrees / rest_degrees
-    return float(score @ np.linalg.solve(covariance, score)) / limit, explained
+    chance = float(fdtri(rank, rest_degrees, 1 - _CHANCE))
+    return float(score @ score) * rest_degrees / (chance * rank * degrees), explained

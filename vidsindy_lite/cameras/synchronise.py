@@ -34,7 +34,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import permutations
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -581,28 +581,22 @@ def find_mistake(
     """
     none = Mistake("", tuple(tracks), rates, check_clocks(clocks, tracks))
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
-        return _found(none, rig, start, names)
-    return None
-
-
-def _found(none: Mistake, rig: Rig, start: Floats, names: Sequence[str]) -> Mistake | None:
-    """The same, where the tracks can be compared."""
-    if none.left(rig, start) <= 2 * DISAGREEMENT:
-        return None
-    _, lags = none.paired(rig.cameras)
-    left = none.left(rig, lags)
-    if left <= 2 * DISAGREEMENT:
-        return None
-    for kind in (_views, _rates, _dropped):
-        # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse none.
-        ranked = [(*one.paired(rig.cameras), one) for one in kind(none, rig, names)]
-        ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
-        tried = [(one.left(rig, best), best, one) for _, best, one in ranked]
-        for now, best, one in sorted(tried, key=lambda one: one[0]):
-            if _MENDED * now < left:
-                told = learn_lags(one.tracks, rig, one.rates, best, one.clocks)
-                if told.residual <= DISAGREEMENT:
-                    return replace(one, lags=told, before=left)
+        if none.left(rig, start) <= 2 * DISAGREEMENT:
+            return None
+        left = none.left(rig, none.paired(rig.cameras)[1])
+        if left <= 2 * DISAGREEMENT:
+            return None
+        for kind in (_views, _rates, _dropped):
+            # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
+            # none.
+            ranked = [(*one.paired(rig.cameras), one) for one in kind(none, rig, names)]
+            ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
+            tried = [(one.left(rig, best), best, one) for _, best, one in ranked]
+            for now, best, one in sorted(tried, key=lambda one: one[0]):
+                if _MENDED * now < left:
+                    told = learn_lags(one.tracks, rig, one.rates, best, one.clocks)
+                    if told.residual <= DISAGREEMENT:
+                        return replace(one, lags=told, before=left)
     return None
 
 
@@ -617,33 +611,32 @@ def _views(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
             what = f"{' and '.join(names[i] for i in moved)} {how}"
             yield Mistake(what, tracks, rates, clocks)
     known = {i for i, camera in enumerate(rig.cameras) if camera.is_calibrated}
-    for axis, what in ((0, "mirrored"), (1, "with v counted upwards")):
-        for views in [*([i] for i in range(count)), [*range(count)]]:
-            told, how = names[views[0]] if len(views) == 1 else "all views", what
-            if len(views) == 1 and not known & {*views}:
-                # Half a turn from a mirrored view is one with v counted upwards.
-                how = "mirrored, or with v counted upwards"
-            elif len(views) == 1 and known <= {*views}:
-                how = "mirrored, or with v counted upwards: then the path has the other sign"
-            if axis == 1 and how != what:
-                continue
-            given = list(none.tracks)
-            for i in views:
-                turned = [given[i][:, 0], given[i][:, 1]]
-                turned[axis] = sizes[i][axis] - 1 - turned[axis]
-                given[i] = np.column_stack(turned)
-            yield replace(none, what=f"{told} {how}", tracks=tuple(given))
+    for views in (*({i} for i in range(count)), {*range(count)}):
+        told, ways = "all views", ["mirrored", "with v counted upwards"]
+        if len(views) == 1:
+            told = names[min(views)]
+            # Half a turn from a mirrored view is one with v counted upwards: an angle that is
+            # learned takes it up, or those of all others do.
+            if known <= views:
+                ways = [", or ".join(ways) + ": then the path has the other sign"]
+            elif not known & views:
+                ways = [", or ".join(ways)]
+        for axis, how in enumerate(ways):
+            tracks = tuple(
+                np.where(np.arange(2) == axis, np.array(size) - 1 - track, track)
+                if i in views else track
+                for i, (track, size) in enumerate(zip(none.tracks, sizes, strict=True))
+            )  # fmt: skip
+            yield replace(none, what=f"{told} {how}", tracks=tracks)
 
 
 def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
     """Orders in which two views change places, or three in a ring; and which these are."""
     for size in (2, 3) if count < _MANY else (2,):
-        for ring in permutations(range(count), size):
-            if ring[0] == min(ring):  # the others are the same ones
-                order = [*range(count)]
-                for i, j in zip(ring, (*ring[1:], ring[0]), strict=True):
-                    order[i] = j
-                yield tuple(sorted(ring)), order
+        for moved, turn in product(combinations(range(count), size), range(1, size)):
+            order = np.arange(count)
+            order[[*moved]] = np.roll(moved, turn)
+            yield moved, order.tolist()
 
 
 def _rates(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
@@ -718,9 +711,5 @@ def _jumps(
     path = [int(total.argmin())]
     for step in before[::-1]:
         path.append(int(step[path[-1]]))
-    path = path[::-1]
-    return [
-        (float(frames[k]), float(path[k] - path[k - 1]))
-        for k in range(1, len(path))
-        if path[k] != path[k - 1]
-    ]
+    jumps = np.diff(path[::-1])
+    return [(float(frames[k + 1]), float(jumps[k])) for k in np.flatnonzero(jumps)]
