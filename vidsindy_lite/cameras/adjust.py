@@ -495,37 +495,34 @@ def _downhill(state: Adjustment) -> tuple[Adjustment | None, float]:
 
 @dataclass(frozen=True)
 class Cause:
-    """Something that may be wrong of some cameras: which components of their changes."""
+    """What may be wrong of some cameras: which components of their changes, and what it leads to.
+
+    ``found`` are the cameras with these free.
+    """
 
     what: str
     cameras: tuple[int, ...]
-    parts: Sequence[int]
-
-    def mask(self, count: int) -> Bools:
-        """The freed components, (m, SIZE)."""
-        freed = np.zeros((count, SIZE), bool)
-        freed[np.ix_(self.cameras, self.parts)] = True
-        return freed
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """A cause, and the cameras that it leads to."""
-
-    cause: Cause
+    freed: Bools
     found: Adjustment
 
     @property
     def left(self) -> float:
-        """`disagreement` of the worst camera of these, pixels."""
+        """`disagreement` of the worst camera of those found, pixels."""
         return self.found.left()
+
+    @property
+    def price(self) -> float:
+        """Schwarz's criterion."""
+        used = np.isfinite(self.found.misses)
+        left = max(float(np.sum(self.found.weighed[0][used] ** 2)), _ROUNDING)
+        return float(used.sum() * np.log(left) + self.freed.sum() * np.log(used.sum()))
 
     def text(self, names: Sequence[str]) -> str:
         """What would explain the residuals best, with its value."""
-        i, what = self.cause.cameras[0], self.cause.what
+        i = self.cameras[0]
         camera, change = self.found.cameras[i], self.found.change[i]
         one = f"cameras[{i}] ({names[i]})"
-        whose = one if len(self.cause.cameras) == 1 else "all cameras"
+        whose = one if len(self.cameras) == 1 else "all cameras"
         parts = {
             "normal": f"the normal ({decimals(camera.normal)}) of {whose}",
             "position": f"the position ({decimals(np.asarray(camera.position))}) of {whose}",
@@ -540,10 +537,10 @@ class Explanation:
             "nearness": "perspective, where the cameras are taken as orthographic, for "
             f"{one} a distance of {1 / max(abs(change[PARTS['nearness']][0]), 1e-12):.3g},",
         }
-        return parts[what]
+        return parts[self.what]
 
 
-def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Explanation | None:
+def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Cause | None:
     """The one thing that explains best what the views leave; None if nothing stands out.
 
     Parameters
@@ -561,24 +558,18 @@ def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Explanation |
         return None
     far = smooth(tracks, learned) and max(disagreement(tracks, learned)) > GROSS
     start = [_near(camera, points[seen].mean(axis=0)) for camera in learned.cameras]
-    causes = [c for c in _causes(start) if (c.mask(len(start)) & (errors == 0)).any()]
     footage = Footage.of(tracks)
     near = adjust(footage, start, np.where(errors > 0, errors, np.inf), most=0)
-    told = [_evidence(near, errors[near.free] > 0, c.mask(len(start))[near.free]) for c in causes]
+    causes = [cause for cause in _causes(near) if (cause.freed & (errors == 0)).any()]
+    told = [_evidence(near, errors[near.free] > 0, cause.freed[near.free]) for cause in causes]
     # Where views are far apart, and no noise makes it, no test is needed.
     rank = [explained if far else evidence for evidence, explained in told]
-    tried = [causes[k] for k in np.argsort(rank)[::-1][:_TRIED] if rank[k] > (0 if far else 1)]
-    best: tuple[float, Explanation] | None = None
-    for cause in tried:
-        freed = cause.mask(len(start))
-        found = adjust(footage, start, np.where(freed, np.inf, errors))
-        used = np.isfinite(found.misses)
-        left = float(np.sum((np.sqrt(found.weights)[:, None] * found.misses)[used] ** 2))
-        count = used.sum()
-        price = count * np.log(max(left, _ROUNDING)) + freed.sum() * np.log(count)
-        if best is None or price < best[0]:
-            best = price, Explanation(cause, found)
-    return None if best is None else best[1]
+    likely = [causes[k] for k in np.argsort(rank)[::-1][:_TRIED] if rank[k] > (0 if far else 1)]
+    tried = [
+        replace(cause, found=adjust(footage, start, np.where(cause.freed, np.inf, errors)))
+        for cause in likely
+    ]
+    return min(tried, key=lambda cause: cause.price, default=None)
 
 
 def smooth(tracks: Sequence[Floats], learned: Rig) -> bool:
@@ -590,23 +581,29 @@ def smooth(tracks: Sequence[Floats], learned: Rig) -> bool:
     return bool(before @ after > _SMOOTH * np.sqrt((before @ before) * (after @ after)))
 
 
-def _causes(cameras: Sequence[Camera]) -> list[Cause]:
+def _causes(near: Adjustment) -> list[Cause]:
     """All that is tried; a lens and a shutter of one camera, and of all as of one make."""
-    every = tuple(range(len(cameras)))
-    flat = tuple(i for i in every if isinstance(cameras[i], OrthographicCamera))
+    every = tuple(range(len(near.start)))
+    flat = tuple(i for i in every if isinstance(near.start[i], OrthographicCamera))
     pinholes = tuple(i for i in every if i not in flat)
+
+    def cause(what: str, cameras: tuple[int, ...], parts: Sequence[int]) -> Cause:
+        freed = np.zeros(near.errors.shape, bool)
+        freed[np.ix_(cameras, parts)] = True
+        return Cause(what, cameras, freed, near)
+
     found = [
-        Cause(what, (i,), PARTS[what][: 2 if i in flat else None])
+        cause(what, (i,), PARTS[what][: 2 if i in flat else None])
         for what in ("normal", "position", "scale", "readout", "lag", "drift")
         for i in every
     ]
     lens = PARTS["distortion"][:2]  # k1 and k2: few motions tell more
-    found += [Cause("distortion", (i,), lens) for i in pinholes]
-    found.append(Cause("readout", every, PARTS["readout"]))
+    found += [cause("distortion", (i,), lens) for i in pinholes]
+    found.append(cause("readout", every, PARTS["readout"]))
     if pinholes:
-        found.append(Cause("distortion", pinholes, lens))
+        found.append(cause("distortion", pinholes, lens))
     if flat:  # the scale is then that of another distance
-        found.append(Cause("nearness", flat, PARTS["nearness"] + PARTS["scale"]))
+        found.append(cause("nearness", flat, PARTS["nearness"] + PARTS["scale"]))
     return found
 
 
