@@ -57,20 +57,18 @@ from scipy.special import fdtri, gammaincinv
 
 from ..arrays import Bools, Floats
 from .clocks import Footage
-from .models import USUAL, Camera, OrthographicCamera, PerspectiveCamera, frozen
-from .rig import (
-    FINE,
-    GROSS,
+from .models import (
     TRIMMED,
-    Rig,
+    USUAL,
+    Camera,
+    OrthographicCamera,
+    PerspectiveCamera,
     at_once,
-    check_views,
-    decimals,
-    disagreement,
+    frozen,
     intersect,
-    residuals,
     trimmed,
 )
+from .rig import FINE, GROSS, Rig, check_views, decimals, disagreement, residuals
 
 _UNTOLD = 1e-15  # of the largest information of any direction: rounding
 PARTS = {

@@ -32,18 +32,17 @@ from ..arrays import Floats, Ints
 from ..checks import check_instance
 from .adjust import DRIFT, LAG, PARTS, adjust, known_to
 from .clocks import Footage, Lags, check_clocks
-from .models import Camera, all_orthographic, independent
-from .rig import (
-    Rig,
+from .models import (
+    Camera,
+    all_orthographic,
     at_once,
-    check_calibrated,
-    check_seen,
-    check_views,
     epipolar_lines,
     epipolar_rows,
+    independent,
     intersect,
     missed,
 )
+from .rig import Rig, check_calibrated, check_seen, check_views
 from .unmeasured import posed
 
 _TOO_FAR = 5.0  # standard errors that a measurement may be off

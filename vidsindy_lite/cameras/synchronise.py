@@ -57,21 +57,18 @@ from .clocks import (
     dips,
     list_lags,
 )
-from .models import Camera
-from .rig import (
-    ALIKE,
-    DISAGREEMENT,
-    FINE,
-    GROSS,
+from .models import (
     TRIMMED,
-    Rig,
+    Camera,
     at_once,
-    check_seen,
     epipolar_lines,
     epipolar_rows,
     trimmed,
 )
-from .rig import missed as missed_by
+from .models import (
+    missed as missed_by,
+)
+from .rig import ALIKE, DISAGREEMENT, FINE, GROSS, Rig, check_seen
 from .unmeasured import posed
 
 _BLOCK = 200_000  # pairs of a lag and an instant at a time

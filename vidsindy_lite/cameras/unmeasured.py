@@ -40,8 +40,8 @@ from scipy.optimize import least_squares
 from ..arrays import Floats
 from .adjust import PARTS, Adjustment, adjust, known_to
 from .clocks import OVERLAP, Footage, Lags, check_clocks, dips
-from .models import AffineCamera, PerspectiveCamera
-from .rig import ALIKE, FINE, GROSS, Rig, at_once, check_views, missed
+from .models import AffineCamera, PerspectiveCamera, at_once, missed
+from .rig import ALIKE, FINE, GROSS, Rig, check_views
 
 _FEWEST = 8  # frames in common of a pair
 _UNKNOWN = 45.0  # degrees
