@@ -58,6 +58,8 @@ from scipy.special import fdtri, gammaincinv
 from ..arrays import Bools, Floats
 from .clocks import Footage
 from .models import (
+    ROUNDING,
+    SETTLED,
     TRIMMED,
     USUAL,
     Camera,
@@ -92,10 +94,8 @@ _LARGEST = 50.0  # logarithm of a scale: a step that leads there is not taken
 _TANGENTIAL = 0.1  # p1 and p2 of a lens, in units of k1
 _OUTLIER = 6.0  # sigma
 _USED = 0.5  # weight of a frame that holds no outlier
-_FINEST = 1e-6  # pixels; noise below that is rounding
 _PRIOR_NOISE = 0.02  # pixels; no track is better than that beside a measurement
-_SETTLED = 1e-11  # pixels, or ...
-_ENOUGH = 1e-7  # ... of sigma, by which a last step moves the images, or ...
+_ENOUGH = 1e-7  # of sigma, by which a last step moves the images, or ...
 _IN_TIME = 1e-4  # ... if clocks move, whose slopes are rough, and in frames
 _LONGEST = 1.0  # frames: further than that, the slope in a lag does not hold
 _LOST = 0.05  # share of what is seen that a step in time may lead out of the video
@@ -107,7 +107,6 @@ _DAMPING = (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2)
 _CHANCE = 1e-6  # of a T that large without a cause
 _TRIED = 5  # of the causes that stand out most
 _SMOOTH = 0.3  # correlation of a residual with the next; that of noise is zero
-_ROUNDING = 1e-9  # pixels
 LAG, DRIFT = PARTS["lag"][0], PARTS["drift"][0]
 
 
@@ -290,9 +289,9 @@ class Adjustment:
         freedom = np.isfinite(self.misses).sum(axis=1) - 3
         squares = np.nansum(self.misses**2, axis=1)[freedom > 0]
         if not squares.size:
-            return _FINEST
+            return ROUNDING
         expected = 2 * gammaincinv(freedom[freedom > 0] / 2, 0.5)
-        return max(float(np.sqrt(np.median(squares / expected))), _FINEST)
+        return max(float(np.sqrt(np.median(squares / expected))), ROUNDING)
 
     @cached_property
     def weights(self) -> Floats:
@@ -446,7 +445,7 @@ def adjust(
             break
         # A frame at the end of a video may come and go with a lag, for ever.
         back = (np.abs(moved.change - earlier) <= _PROBE * state.unit).all()
-        enough = max(_SETTLED, (_IN_TIME if state.timed else _ENOUGH) * moved.noise)
+        enough = max(SETTLED, (_IN_TIME if state.timed else _ENOUGH) * moved.noise)
         still = step <= enough or (state.timed and back)
         moved.settled = bool(still and moved.noise >= state.noise * (1 - 1e-3))
         moved.steps, earlier, state = state.steps + 1, state.change, moved
@@ -512,7 +511,7 @@ class Cause:
     def price(self) -> float:
         """Schwarz's criterion."""
         used = np.isfinite(self.found.misses)
-        left = max(float(np.sum(self.found.weighed[0][used] ** 2)), _ROUNDING)
+        left = max(float(np.sum(self.found.weighed[0][used] ** 2)), ROUNDING)
         return float(used.sum() * np.log(left) + self.freed.sum() * np.log(used.sum()))
 
     def text(self, names: Sequence[str]) -> str:

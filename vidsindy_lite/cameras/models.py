@@ -67,6 +67,10 @@ from ..checks import (
     shown,
 )
 
+ROUNDING = 1e-6
+"""Pixels by which numbers in files and exact tracks are off."""
+SETTLED = 1e-11
+"""Pixels by which a last step of a search moves an image at most."""
 PARALLEL = 1e-6
 """Sine of the angle below which two lines of sight count as parallel."""
 LENS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
@@ -77,7 +81,6 @@ TRIMMED = 0.9
 
 _STEPS = 30  # of Newton, from the distorted point, or the linear solution: four or five are usual
 _SETTLED = 1e-14  # of the focal length
-_STILL = 1e-11  # pixels
 _LARGEST = 0.49  # frames; so instants never overtake each other, whatever an outlier says
 _DOWN = np.array([1.0, -1.0])  # the lens's y is down, the ideal image's up
 
@@ -968,12 +971,12 @@ def _gauss_newton(
             new_slope, new_missed = look(point[active] + step, active)
             new_error, error = np.sum(new_missed**2, axis=1), np.sum(missed[active] ** 2, axis=1)
         moved = np.abs(slope[active] @ step[..., None]).max(axis=(1, 2), initial=0)
-        lower = new_error <= (1 + 1e-12) * error + _STILL**2  # or equal, but for rounding
+        lower = new_error <= (1 + 1e-12) * error + SETTLED**2  # or equal, but for rounding
         part[active] = np.where(lower, 1, part[active] / 2)
         taken = active[lower]
         point[taken] += step[lower]
         slope[taken], missed[taken] = new_slope[lower], new_missed[lower]
-        active = active[~(moved <= _STILL)]
+        active = active[~(moved <= SETTLED)]
         if not active.size:
             break
     return point, ~np.isin(np.arange(len(start)), active)

@@ -63,6 +63,7 @@ from ..repository import write_file
 from .models import (
     LENS,
     MODELS,
+    ROUNDING,
     Camera,
     OrthographicCamera,
     PerspectiveCamera,
@@ -81,6 +82,8 @@ ALIKE = 2.0
 """Ratio of residuals up to which two explanations fit equally well, ..."""
 FINE = 0.05
 """... and residual in pixels below which all do: real tracks are no better than that."""
+BETTER = 1.25
+"""Ratio of residuals from which on more unknowns are worth it."""
 GROSS = 4.0
 """Pixels; real calibrations of real tracks leave up to half of that."""
 _FEWEST = 3  # cameras of which nothing is measured
@@ -145,8 +148,7 @@ _KNOWN = {key for keys in (*_NAMES.values(), *_SIZES, _MARKS) for key in keys} |
     "rotation_count", "distortion_model", "distortion_type",
 }  # fmt: skip
 """Keys that are read, and those that change nothing of what a camera sees."""
-_SKEW = 1e-6  # pixels, at the edge of the image, that are rounding; and ...
-_MOST_SKEW = 5.0  # ... that are no camera's
+_SKEWED = 5.0  # pixels, at the edge of the image, that are no camera's
 
 
 @dataclass(frozen=True)
@@ -632,7 +634,7 @@ def read_calibration(
                 f"paths: must hold a camera matrix (K), DLT coefficients or P, got none in '{path}'"
             )
         for camera, skew in found:
-            if skew > _SKEW:
+            if skew > ROUNDING:
                 warnings.append(
                     f"cameras[{len(cameras)}] ({path.name}): its pixels are skew, by {skew:.2g} "
                     "pixels at the edge of the image, which is left out"
@@ -780,7 +782,7 @@ def _from_projection(matrix: Floats, size: tuple[int, int]) -> tuple[Perspective
     shift = np.linalg.solve(inner, matrix[:, 3])
     inner = inner / inner[2, 2]
     skew = abs(inner[0, 1] / inner[1, 1]) * size[1] / 2
-    if skew > _MOST_SKEW:
+    if skew > _SKEWED:
         raise ValueError(
             f"P: must be of a camera with square corners, got a skew of {skew:.3g} pixels at the "
             "edge of the image"
@@ -797,7 +799,7 @@ def _from_opencv(table: dict[str, Any], given: tuple[int, int] | None) -> Perspe
     if inner[0, 0] <= 0 or inner[1, 1] <= 0 or np.abs(inner[2] - [0, 0, 1]).max() > 1e-12:
         raise ValueError(f"K: must be [[fx, s, cx], [0, fy, cy], [0, 0, 1]], got {inner.tolist()}")
     skew = abs(inner[0, 1] / inner[1, 1]) * inner[1, 2]
-    if skew > _SKEW:
+    if skew > ROUNDING:
         raise ValueError(f"K: must have no skew, got {inner[0, 1]:g}")
     turned = check_array("R", table["R"])
     if turned.size == 3:

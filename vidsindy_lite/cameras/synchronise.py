@@ -68,7 +68,7 @@ from .models import (
 from .models import (
     missed as missed_by,
 )
-from .rig import ALIKE, DISAGREEMENT, FINE, GROSS, Rig, check_seen
+from .rig import ALIKE, BETTER, DISAGREEMENT, FINE, GROSS, Rig, check_seen
 from .unmeasured import posed
 
 _BLOCK = 200_000  # pairs of a lag and an instant at a time
@@ -78,7 +78,6 @@ _APART = 1.0  # frames; lags closer than that are one and the same
 _PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
 _CLEAR = 4.0  # standard errors by which a clock must drift, ...
 _ENOUGH = 0.05  # ... and frames over the whole video
-_LEAST = 1e-6  # share of a slope that is motion
 _TIMES = LAG, DRIFT
 BLURRED = 0.5
 """Standard error of a lag, in frames, beyond which it counts as unknown."""
@@ -86,7 +85,6 @@ BLURRED = 0.5
 _ROUGH_STEPS = 8  # of the second step
 _SHOWN = 3  # of the lags that fit equally well
 _LOOSE = 0.05  # of tilts, log scales and angles that a hand measured: three degrees, 5 %
-_BETTER = 1.25  # times smaller residuals are a reason to doubt what was measured
 RATES = ((25, 30), (30, 25), (24, 30), (30, 24), (24, 25), (25, 24), (30, 60), (60, 30))
 """Rates over those stated that are taken for each other."""
 _MENDED = 3.0  # times by which a mistake has to mend the disagreement of all views together
@@ -97,7 +95,7 @@ _FRAMES = 1500  # of the first video at which a jump of the lag is sought
 _LONGEST = 60  # frames by which it may jump
 _MOST, _PRICE = 8.0, 40.0  # typical misses: the most that one frame counts, and the price of a jump
 _MANY = 6  # cameras, of which only two are taken for each other
-_ROUNDING = 1e-9  # pixels
+_ROUNDING = 1e-9  # scene units, or a share of a slope that is motion
 
 
 def promising_lags(footage: Footage, cameras: Sequence[Camera]) -> list[list[float]]:
@@ -228,7 +226,7 @@ def covariance(fit: Adjustment) -> Floats:
     cameras, parts = np.argwhere(fit.free).T
     order = np.concatenate([np.flatnonzero(parts == part) for part in _TIMES])
     # Slopes that are noise add to the information, but mend nothing.
-    share = np.append(1.0, np.maximum(shares(fit), _LEAST))[cameras[order]]
+    share = np.append(1.0, np.maximum(shares(fit), _ROUNDING))[cameras[order]]
     factor = fit.factor[order] / share[:, None]
     return factor @ factor.T
 
@@ -411,11 +409,11 @@ def _searched(videos: _Videos, first: Floats) -> tuple[bool, list[Adjustment]]:
         return False, exact
     if score(exact[0]) <= DISAGREEMENT:
         other = videos.fitted(exact[0].footage.lags, rough=True, loose=True)
-        if other is None or score(other) * _BETTER >= score(exact[0]):
+        if other is None or score(other) * BETTER >= score(exact[0]):
             return False, exact
     # Where the rig is wrong, its best lags may be wrong as well: so all are tried again.
     loose = _climbed(videos, promising, first, True)
-    if loose and score(loose[0]) * _BETTER < score(exact[0]):
+    if loose and score(loose[0]) * BETTER < score(exact[0]):
         return True, loose
     return False, exact
 

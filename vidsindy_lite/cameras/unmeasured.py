@@ -40,7 +40,7 @@ from ..arrays import Floats
 from .adjust import PARTS, Adjustment, adjust, known_to
 from .clocks import OVERLAP, Footage, Lags, check_clocks, dips
 from .models import AffineCamera, PerspectiveCamera, at_once, missed
-from .rig import ALIKE, FINE, GROSS, Rig, check_views
+from .rig import ALIKE, BETTER, FINE, GROSS, Rig, check_views
 
 _FEWEST = 8  # frames in common of a pair
 _UNKNOWN = 45.0  # degrees
@@ -58,7 +58,6 @@ _EITHER_HAND = (
 )
 _Pose = tuple[NDArray[Any], NDArray[Any]]  # OpenCV's rotation and shift
 _PROMISING = 20  # lags of each view
-_BETTER = 1.25  # times less noise is a reason for one more direction of motion
 _MOVES = 5.0  # times what is left by which a target must move, rms, in every view
 _NOTE = (
     "nothing is known of the cameras: the path is known but for an affine map, its axes are those "
@@ -327,7 +326,7 @@ def factorised(
         _best(some, rank) if lags is None else (_left(some, lags, range(len(tracks)), rank), lags)
         for rank in ranks
     ]
-    enough = max(_BETTER * found[-1][0], FINE)
+    enough = max(BETTER * found[-1][0], FINE)
     rank = next(rank for rank, (left, _) in zip(ranks, found, strict=True) if left <= enough)
     left, best = found[rank - 1]
     if not np.isfinite(left):
