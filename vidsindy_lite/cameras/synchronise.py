@@ -57,17 +57,7 @@ from .clocks import (
     dips,
     list_lags,
 )
-from .models import (
-    TRIMMED,
-    Camera,
-    at_once,
-    epipolar_lines,
-    epipolar_rows,
-    trimmed,
-)
-from .models import (
-    missed as missed_by,
-)
+from .models import TRIMMED, Camera, at_once, epipolar_lines, epipolar_rows, missed, trimmed
 from .rig import ALIKE, BETTER, DISAGREEMENT, FINE, GROSS, Rig, check_seen
 from .unmeasured import posed
 
@@ -500,8 +490,7 @@ def _untold(videos: _Videos, lags: Floats, agree: bool) -> Lags:
     residual, footage = np.inf, videos.footage(lags)
     cameras = videos.cameras(footage)
     if cameras is not None:
-        missed = missed_by(cameras, footage.aligned)
-        residual = max(map(trimmed, missed))
+        residual = max(map(trimmed, missed(cameras, footage.aligned)))
     warnings = [_blurred(i, lags) for i in range(1, len(lags))]
     if not agree:
         left = f"leave {residual:.2g} pixels" if residual < np.inf else "no cameras fit"
@@ -544,9 +533,9 @@ class Mistake:
         """By how much two views disagree at their best lags, all pairs; and these lags."""
         footage = Footage.of(self.tracks, None, self.rates, self.clocks)
         least, lags = [], []
-        for tried, missed in lag_misses(footage, cameras, _INSTANTS):
-            least.append(missed.min())
-            lags.append(tried[missed.argmin()])
+        for tried, left in lag_misses(footage, cameras, _INSTANTS):
+            least.append(left.min())
+            lags.append(tried[left.argmin()])
         behind = np.insert(lags, first_known(cameras), 0.0)
         return float(np.linalg.norm(least)), behind - behind[0]
 
