@@ -19,12 +19,10 @@ from vidsindy_lite.cameras import (
     check_learnable,
     learn_cameras,
     learn_cameras_eq4,
+    models,
     reconstruct,
     residuals,
     synchronise,
-)
-from vidsindy_lite.cameras import (
-    rig as rigs,
 )
 from vidsindy_lite.cameras.calibrate import Equations, _solved
 from vidsindy_lite.cameras.models import rodrigues
@@ -401,7 +399,7 @@ def test_a_search_for_cameras_that_ran_out_of_steps(monkeypatch, kind):
 
 def test_points_that_did_not_settle(monkeypatch):
     rig, tracks = filmed(vl.PerspectiveCamera)
-    monkeypatch.setattr(rigs, "_STEPS", 1)
+    monkeypatch.setattr(models, "_STEPS", 1)
     warnings = vl.learn_cameras(tracks, rig.uncalibrated()).warnings
     assert "the target's place is uncertain in 120 of 120 frames" in warnings[-1]
 

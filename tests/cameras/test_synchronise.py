@@ -15,7 +15,7 @@ import vidsindy_lite as vl
 from vidsindy_lite.cameras import align, disagreement, learn_lags, list_lags
 from vidsindy_lite.cameras.adjust import PARTS, SIZE, adjust
 from vidsindy_lite.cameras.clocks import Footage
-from vidsindy_lite.cameras.synchronise import Timing
+from vidsindy_lite.cameras.synchronise import agrees
 
 NOISE = 0.05  # pixels
 
@@ -332,11 +332,11 @@ def test_lags_and_rolling_shutters_are_told_apart():
 
 
 @pytest.mark.parametrize(
-    ("size", "memory", "agrees"),
+    ("size", "memory", "told"),
     [(0.1, 0.0, True), (2.0, 0.0, True), (1e3, 0.0, False), (0.01, 0.9, False), (1.0, 0.35, True),
      (2.0, 0.35, False)],
 )  # fmt: skip
-def test_noise_agrees_and_what_persists_does_not(motion, size, memory, agrees):
+def test_noise_agrees_and_what_persists_does_not(motion, size, memory, told):
     """Noise however large, unless it is gross; what is like the next frame's, if it is small."""
     rng = np.random.default_rng(0)
     misses = size * np.hstack([dependent(rng, 400, memory) for _ in range(3)])
@@ -345,4 +345,4 @@ def test_noise_agrees_and_what_persists_does_not(motion, size, memory, agrees):
     errors[1:, PARTS["lag"]] = np.inf
     fit = replace(adjust(Footage.of(tracks), motion[1].cameras, errors))
     fit.misses, fit.weights = misses / 2, np.ones(len(misses))
-    assert Timing(fit).agrees is agrees
+    assert agrees(fit) is told

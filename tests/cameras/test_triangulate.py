@@ -12,7 +12,7 @@ from vidsindy_lite.cameras import (
     Rig,
     reconstruct,
 )
-from vidsindy_lite.cameras.rig import epipolar_lines, epipolar_rows, intersect
+from vidsindy_lite.cameras.models import epipolar_lines, epipolar_rows, intersect
 
 
 def scene(*kinds, frames=40, seed=3):

@@ -2,9 +2,8 @@
 
 ::
 
-    models        the two models of camera, lens and shutter, rotations and planes
-    rig           the cameras that watch one scene, their file, and where their lines of sight meet
-    files         rigs from the files of other tools
+    models        the two models of camera, lens and shutter, and where their lines of sight meet
+    rig           the cameras that watch one scene, and their files, ours and those of other tools
     clocks        tracks at the same instants, whatever the lags, rates and clocks of the videos
     adjust        bundle adjustment: cameras, clocks and path together; what else would explain them
     unmeasured    rigs of which nothing is known: where they stand, or a path up to an affine map
@@ -19,10 +18,10 @@ from .adjust import explain, smooth
 from .calibrate import calibration_errors, check_learnable, learn_cameras, learn_cameras_eq4
 from .calibrate import systematic_errors, tracking_errors
 from .clocks import Clock, Lags, align, list_lags
-from .files import read_calibration
 from .models import AffineCamera, Camera, OrthographicCamera, PerspectiveCamera
 from .models import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance
-from .rig import ALIKE, DISAGREEMENT, GROSS, Rig, disagreement, reconstruct, residuals, rig_template
+from .rig import ALIKE, DISAGREEMENT, GROSS, Rig, disagreement, read_calibration, reconstruct
+from .rig import residuals, rig_template
 from .synchronise import find_mistake, learn_lags
 from .targets import identify, side_by_side, stacked
 from .unmeasured import Factorised, factorised, posed

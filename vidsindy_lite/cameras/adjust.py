@@ -34,11 +34,9 @@ direction the larger of both counts.
 **Why views do not agree.** `explain` frees one thing at a time. Residuals of a right rig are the
 errors of the tracks. A wrong normal, lens or clock leaves more, which follows the motion; how large
 it may be without a word depends on these errors, and not on a fixed number of pixels. For each
-cause, with slopes C of the residuals r in it (all that is free anyway projected out), the score g =
-C'r is compared with its covariance, in which residuals that depend on their neighbours count for
-what they are worth:
+cause, the change c of cameras that one step finds with it free is compared with its covariance:
 
-    T = g' Omega^-1 g,      Omega of the residuals that the cause leaves.
+    T = c' S^-1 c,      S as above, of the residuals that the cause leaves.
 
 A cause that stands out is tried: cameras and path are adjusted with it free.
 
@@ -59,20 +57,20 @@ from scipy.special import fdtri, gammaincinv
 
 from ..arrays import Bools, Floats
 from .clocks import Footage
-from .models import USUAL, Camera, OrthographicCamera, PerspectiveCamera, frozen
-from .rig import (
-    FINE,
-    GROSS,
+from .models import (
+    ROUNDING,
+    SETTLED,
     TRIMMED,
-    Rig,
+    USUAL,
+    Camera,
+    OrthographicCamera,
+    PerspectiveCamera,
     at_once,
-    check_views,
-    decimals,
-    disagreement,
+    frozen,
     intersect,
-    residuals,
     trimmed,
 )
+from .rig import FINE, GROSS, Rig, check_views, decimals, disagreement, residuals
 
 _UNTOLD = 1e-15  # of the largest information of any direction: rounding
 PARTS = {
@@ -95,10 +93,9 @@ STEPS = 60
 _LARGEST = 50.0  # logarithm of a scale: a step that leads there is not taken
 _TANGENTIAL = 0.1  # p1 and p2 of a lens, in units of k1
 _OUTLIER = 6.0  # sigma
-_FINEST = 1e-6  # pixels; noise below that is rounding
+_USED = 0.5  # weight of a frame that holds no outlier
 _PRIOR_NOISE = 0.02  # pixels; no track is better than that beside a measurement
-_SETTLED = 1e-11  # pixels, or ...
-_ENOUGH = 1e-7  # ... of sigma, by which a last step moves the images, or ...
+_ENOUGH = 1e-7  # of sigma, by which a last step moves the images, or ...
 _IN_TIME = 1e-4  # ... if clocks move, whose slopes are rough, and in frames
 _LONGEST = 1.0  # frames: further than that, the slope in a lag does not hold
 _LOST = 0.05  # share of what is seen that a step in time may lead out of the video
@@ -109,9 +106,7 @@ _FLAT = 1e-9  # of the largest pivot; smaller ones leave a point where it is
 _DAMPING = (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2)
 _CHANCE = 1e-6  # of a T that large without a cause
 _TRIED = 5  # of the causes that stand out most
-_DEGENERATE = 1e-3  # share of a slope that nothing else explains; less tells nothing
 _SMOOTH = 0.3  # correlation of a residual with the next; that of noise is zero
-_ROUNDING = 1e-9  # pixels
 LAG, DRIFT = PARTS["lag"][0], PARTS["drift"][0]
 
 
@@ -294,9 +289,9 @@ class Adjustment:
         freedom = np.isfinite(self.misses).sum(axis=1) - 3
         squares = np.nansum(self.misses**2, axis=1)[freedom > 0]
         if not squares.size:
-            return _FINEST
+            return ROUNDING
         expected = 2 * gammaincinv(freedom[freedom > 0] / 2, 0.5)
-        return max(float(np.sqrt(np.median(squares / expected))), _FINEST)
+        return max(float(np.sqrt(np.median(squares / expected))), ROUNDING)
 
     @cached_property
     def weights(self) -> Floats:
@@ -306,6 +301,11 @@ class Adjustment:
         if self.timed and len(weights):  # ... or is beside one, as interpolation carries a part
             weights = minimum_filter1d(weights, 2 * _BESIDE + 1)
         return np.where(np.isfinite(self.misses).any(axis=1), weights, 0.0)
+
+    @property
+    def used(self) -> Bools:
+        """Instants that hold no outlier, (n,)."""
+        return self.weights > _USED
 
     @property
     def free(self) -> Bools:
@@ -333,7 +333,7 @@ class Adjustment:
 
     @cached_property
     def reduced(self) -> _Reduced:
-        """Misses and their slopes in the free changes, with the points taken out by QR."""
+        """Slopes in the free changes, with the points taken out by QR."""
         seen = np.isfinite(self.misses)[..., None]
         in_change, in_points = (np.where(seen, np.nan_to_num(part), 0.0) for part in self._slopes())
         q, r = np.linalg.qr(in_points)
@@ -344,7 +344,6 @@ class Adjustment:
         of_change, of_misses = (q.swapaxes(1, 2) @ part for part in (in_change, missed))
         return _Reduced(
             in_change - q @ of_change,
-            (missed - q @ of_misses)[..., 0],
             -np.linalg.solve(r, of_misses)[..., 0],
             -np.linalg.solve(r, of_change),
             of_misses[..., 0],
@@ -378,13 +377,21 @@ class Adjustment:
         return root * np.nan_to_num(self.misses), root[..., None] * self.reduced.slopes
 
     @property
+    def system(self) -> tuple[Floats, Floats]:
+        """Linear equations for a step, of residuals and measurements in units of their errors."""
+        (missed, slopes), prior = self.weighed, np.sqrt(self.prior)
+        sigma = max(self.noise, _PRIOR_NOISE)
+        rows = np.vstack((slopes.reshape(-1, len(prior)) / sigma, np.diag(prior)))
+        return rows, -np.append(missed.ravel() / sigma, prior * self.change[self.free])
+
+    @property
     def factor(self) -> Floats:
         """`fitted_factor` of the free changes."""
         return fitted_factor(*self.weighed, self.prior, self.noise)
 
 
 class _Reduced(NamedTuple):
-    """Slopes, (n, 2 m, p), and misses, (n, 2 m), with the points taken out.
+    """Slopes, (n, 2 m, p), with the points taken out.
 
     The points move by `own`, (n, 3), to where they are missed least, and with the changes by
     `follow`, (n, 3, p); a point that its views do not tell stays. `along`, (n, 3), is what of the
@@ -392,7 +399,6 @@ class _Reduced(NamedTuple):
     """
 
     slopes: Floats
-    misses: Floats
     own: Floats
     follow: Floats
     along: Floats
@@ -439,7 +445,7 @@ def adjust(
             break
         # A frame at the end of a video may come and go with a lag, for ever.
         back = (np.abs(moved.change - earlier) <= _PROBE * state.unit).all()
-        enough = max(_SETTLED, (_IN_TIME if state.timed else _ENOUGH) * moved.noise)
+        enough = max(SETTLED, (_IN_TIME if state.timed else _ENOUGH) * moved.noise)
         still = step <= enough or (state.timed and back)
         moved.settled = bool(still and moved.noise >= state.noise * (1 - 1e-3))
         moved.steps, earlier, state = state.steps + 1, state.change, moved
@@ -448,15 +454,12 @@ def adjust(
 
 def _downhill(state: Adjustment) -> tuple[Adjustment | None, float]:
     """The state after a step that lessens the errors, and how far it moved images, pixels."""
-    weights, sigma, reduced = state.weights, max(state.noise, _PRIOR_NOISE), state.reduced
-    free, prior = state.free, np.sqrt(state.prior)
-    root = np.sqrt(weights)[:, None] / sigma
-    rows = np.vstack(((root[..., None] * reduced.slopes).reshape(-1, len(prior)), np.diag(prior)))
-    target = -np.append((root * reduced.misses).ravel(), prior * state.change[free])
-    size = np.sqrt(np.sum(rows**2, axis=0))
+    free, prior, reduced = state.free, np.sqrt(state.prior), state.reduced
+    weights, sigma = state.weights, max(state.noise, _PRIOR_NOISE)
+    rows, target = state.system
+    size = _sizes(rows)
     if not np.isfinite(size).all():
         return None, np.inf
-    size[size == 0] = 1.0
     factor, triangle = np.linalg.qr(rows / size)
     aim = np.append(factor.T @ target, np.zeros(len(size)))
     lags = np.argwhere(free)[:, 1] == LAG
@@ -489,37 +492,34 @@ def _downhill(state: Adjustment) -> tuple[Adjustment | None, float]:
 
 @dataclass(frozen=True)
 class Cause:
-    """Something that may be wrong of some cameras: which components of their changes."""
+    """What may be wrong of some cameras: which components of their changes, and what it leads to.
+
+    ``found`` are the cameras with these free.
+    """
 
     what: str
     cameras: tuple[int, ...]
-    parts: Sequence[int]
-
-    def mask(self, count: int) -> Bools:
-        """The freed components, (m, SIZE)."""
-        freed = np.zeros((count, SIZE), bool)
-        freed[np.ix_(self.cameras, self.parts)] = True
-        return freed
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """A cause, and the cameras that it leads to."""
-
-    cause: Cause
+    freed: Bools
     found: Adjustment
 
     @property
     def left(self) -> float:
-        """`disagreement` of the worst camera of these, pixels."""
+        """`disagreement` of the worst camera of those found, pixels."""
         return self.found.left()
+
+    @property
+    def price(self) -> float:
+        """Schwarz's criterion."""
+        used = np.isfinite(self.found.misses)
+        left = max(float(np.sum(self.found.weighed[0][used] ** 2)), ROUNDING)
+        return float(used.sum() * np.log(left) + self.freed.sum() * np.log(used.sum()))
 
     def text(self, names: Sequence[str]) -> str:
         """What would explain the residuals best, with its value."""
-        i, what = self.cause.cameras[0], self.cause.what
+        i = self.cameras[0]
         camera, change = self.found.cameras[i], self.found.change[i]
         one = f"cameras[{i}] ({names[i]})"
-        whose = one if len(self.cause.cameras) == 1 else "all cameras"
+        whose = one if len(self.cameras) == 1 else "all cameras"
         parts = {
             "normal": f"the normal ({decimals(camera.normal)}) of {whose}",
             "position": f"the position ({decimals(np.asarray(camera.position))}) of {whose}",
@@ -534,10 +534,10 @@ class Explanation:
             "nearness": "perspective, where the cameras are taken as orthographic, for "
             f"{one} a distance of {1 / max(abs(change[PARTS['nearness']][0]), 1e-12):.3g},",
         }
-        return parts[what]
+        return parts[self.what]
 
 
-def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Explanation | None:
+def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Cause | None:
     """The one thing that explains best what the views leave; None if nothing stands out.
 
     Parameters
@@ -555,24 +555,18 @@ def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Explanation |
         return None
     far = smooth(tracks, learned) and max(disagreement(tracks, learned)) > GROSS
     start = [_near(camera, points[seen].mean(axis=0)) for camera in learned.cameras]
-    causes = [c for c in _causes(start) if (c.mask(len(start)) & (errors == 0)).any()]
     footage = Footage.of(tracks)
     near = adjust(footage, start, np.where(errors > 0, errors, np.inf), most=0)
-    sizes = [_sizes(near, errors, cause) for cause in causes]
+    causes = [cause for cause in _causes(near) if (cause.freed & (errors == 0)).any()]
+    told = [_evidence(near, errors[near.free] > 0, cause.freed[near.free]) for cause in causes]
     # Where views are far apart, and no noise makes it, no test is needed.
-    rank = [explained if far else evidence for evidence, explained in sizes]
-    tried = [causes[k] for k in np.argsort(rank)[::-1][:_TRIED] if rank[k] > (0 if far else 1)]
-    best: tuple[float, Explanation] | None = None
-    for cause in tried:
-        freed = cause.mask(len(start))
-        found = adjust(footage, start, np.where(freed, np.inf, errors))
-        used = np.isfinite(found.misses)
-        left = float(np.sum((np.sqrt(found.weights)[:, None] * found.misses)[used] ** 2))
-        count = used.sum()
-        price = count * np.log(max(left, _ROUNDING)) + freed.sum() * np.log(count)
-        if best is None or price < best[0]:
-            best = price, Explanation(cause, found)
-    return None if best is None else best[1]
+    rank = [explained if far else evidence for evidence, explained in told]
+    likely = [causes[k] for k in np.argsort(rank)[::-1][:_TRIED] if rank[k] > (0 if far else 1)]
+    tried = [
+        replace(cause, found=adjust(footage, start, np.where(cause.freed, np.inf, errors)))
+        for cause in likely
+    ]
+    return min(tried, key=lambda cause: cause.price, default=None)
 
 
 def smooth(tracks: Sequence[Floats], learned: Rig) -> bool:
@@ -584,23 +578,29 @@ def smooth(tracks: Sequence[Floats], learned: Rig) -> bool:
     return bool(before @ after > _SMOOTH * np.sqrt((before @ before) * (after @ after)))
 
 
-def _causes(cameras: Sequence[Camera]) -> list[Cause]:
+def _causes(near: Adjustment) -> list[Cause]:
     """All that is tried; a lens and a shutter of one camera, and of all as of one make."""
-    every = tuple(range(len(cameras)))
-    flat = tuple(i for i in every if isinstance(cameras[i], OrthographicCamera))
+    every = tuple(range(len(near.start)))
+    flat = tuple(i for i in every if isinstance(near.start[i], OrthographicCamera))
     pinholes = tuple(i for i in every if i not in flat)
+
+    def cause(what: str, cameras: tuple[int, ...], parts: Sequence[int]) -> Cause:
+        freed = np.zeros(near.errors.shape, bool)
+        freed[np.ix_(cameras, parts)] = True
+        return Cause(what, cameras, freed, near)
+
     found = [
-        Cause(what, (i,), PARTS[what][: 2 if i in flat else None])
+        cause(what, (i,), PARTS[what][: 2 if i in flat else None])
         for what in ("normal", "position", "scale", "readout", "lag", "drift")
         for i in every
     ]
     lens = PARTS["distortion"][:2]  # k1 and k2: few motions tell more
-    found += [Cause("distortion", (i,), lens) for i in pinholes]
-    found.append(Cause("readout", every, PARTS["readout"]))
+    found += [cause("distortion", (i,), lens) for i in pinholes]
+    found.append(cause("readout", every, PARTS["readout"]))
     if pinholes:
-        found.append(Cause("distortion", pinholes, lens))
+        found.append(cause("distortion", pinholes, lens))
     if flat:  # the scale is then that of another distance
-        found.append(Cause("nearness", flat, PARTS["nearness"] + PARTS["scale"]))
+        found.append(cause("nearness", flat, PARTS["nearness"] + PARTS["scale"]))
     return found
 
 
@@ -612,38 +612,30 @@ def _near(camera: Camera, about: Floats) -> Camera:
     return NearCamera(about=about, **values)
 
 
-def _sizes(near: Adjustment, errors: Floats, cause: Cause) -> tuple[float, float]:
+def _sizes(rows: Floats) -> Floats:
+    """Lengths of columns, one where they are zero."""
+    size = np.linalg.norm(rows, axis=0)
+    return np.where(size == 0, 1.0, size)
+
+
+def _evidence(near: Adjustment, free: Bools, wanted: Bools) -> tuple[float, float]:
     """T over what chance may make it, zero if it would not matter; pixels that it explains."""
-    missed, slopes = near.weighed
-    free, wanted = errors[near.errors > 0] > 0, cause.mask(len(errors))[near.errors > 0]
-    own = slopes[..., wanted & ~free]
-    flat, target = own.reshape(-1, own.shape[-1]), missed.ravel()
-    size = np.sqrt(np.sum(flat**2, axis=0))
-    flat, size = flat[:, size > 0], size[size > 0]
-    if not size.size:
-        return 0.0, 0.0
-    prior = near.noise / errors[near.errors > 0][free]
-    others = np.vstack((slopes[..., free].reshape(len(flat), -1), np.diag(prior)))
-    padded = np.vstack((flat / size, np.zeros((len(prior), len(size)))))
-    if free.any():
-        solved = np.linalg.lstsq(others, padded, rcond=1e-10)[0]
-        padded = padded - others @ solved
-    left, singular, _ = np.linalg.svd(padded, full_matrices=False)
-    left = left[: len(flat), singular > _DEGENERATE]
-    if not left.shape[1]:
-        return 0.0, 0.0
-    score = left.T @ target
-    rest = (target - left @ score).reshape(missed.shape)
-    each = np.einsum("nmk,nm->nk", left.reshape(*missed.shape, -1), rest)
-    covariance = long_run_covariance(each) * len(each)
-    covariance += _ROUNDING**2 * np.eye(len(covariance))
-    explained = float(np.linalg.norm(score) / np.sqrt(np.isfinite(near.misses).sum()))
+    told, own = free | wanted, (wanted & ~free)[free | wanted]
+    (rows, target), (missed, slopes) = near.system, near.weighed
+    rows, slopes = rows[:, told], slopes[..., told]
+    size = _sizes(rows)
+    step = np.linalg.lstsq(rows / size, target, rcond=1e-10)[0]
+    left = missed + slopes @ (step / size)
+    share = float(np.linalg.norm(left)) / max(float(np.linalg.norm(missed)), 1e-300)
+    factor = fitted_factor(left, slopes, near.prior[told], share * near.noise) * size[:, None]
+    score, _, rank, _ = np.linalg.lstsq(factor[own], step[own], rcond=1e-10)
+    explained = np.sqrt(max(1 - share**2, 0.0) * np.sum(missed**2) / np.isfinite(near.misses).sum())
+    each = np.einsum("nmk,nm->nk", slopes[..., own], left)
     # Bartlett's weights of that width leave as many degrees of freedom (2/3 is their square's
-    # integral) to estimate Omega with: Hotelling's T.
+    # integral) to estimate the covariance with: Hotelling's T.
     degrees = 1.5 * len(each) / (bandwidth(each) + 1)
-    rest_degrees = degrees - len(score) + 1
+    rest_degrees = degrees - rank + 1
     if explained < FINE or rest_degrees <= 0:
         return 0.0, explained
-    chance = float(fdtri(len(score), rest_degrees, 1 - _CHANCE))
-    limit = chance * len(score) * degrees / rest_degrees
-    return float(score @ np.linalg.solve(covariance, score)) / limit, explained
+    chance = float(fdtri(rank, rest_degrees, 1 - _CHANCE))
+    return float(score @ score) * rest_degrees / (chance * rank * degrees), explained

@@ -32,25 +32,24 @@ from ..arrays import Floats, Ints
 from ..checks import check_instance
 from .adjust import DRIFT, LAG, PARTS, adjust, known_to
 from .clocks import Footage, Lags, check_clocks
-from .models import Camera, all_orthographic, independent
-from .rig import (
-    Rig,
+from .models import (
+    ROUNDING,
+    Camera,
+    all_orthographic,
     at_once,
-    check_calibrated,
-    check_seen,
-    check_views,
     epipolar_lines,
     epipolar_rows,
+    independent,
     intersect,
     missed,
 )
+from .rig import Rig, check_calibrated, check_seen, check_views
 from .unmeasured import posed
 
 _TOO_FAR = 5.0  # standard errors that a measurement may be off
 _TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1
 # A frame that is missed by more than so many robust standard deviations holds an outlier.
 _OUTLIER = 8.0
-_ROUNDING = 1e-6  # pixels; missing by less is no disagreement
 _ROUNDS = 20  # of weighing equations, for the least absolute misses
 # Motion must tell by so many times the misfit in countless frames, and over sqrt(n) more in n.
 _TELLING, _FEW = 1.45, 8.0
@@ -95,10 +94,10 @@ def _without_outliers(every: Equations, scale: float) -> Equations:
     """The frames of which the fit of the least absolute misses, in pixels, misses none by far."""
     missed = np.ones(len(every.target))
     for _ in range(_ROUNDS):
-        root = np.sqrt(np.maximum(missed, _ROUNDING))
+        root = np.sqrt(np.maximum(missed, ROUNDING))
         solution = np.linalg.lstsq(every.design / root[:, None], every.target / root)[0]
         missed = np.abs(every.design @ solution - every.target) / scale
-    limit = max(_OUTLIER * 1.4826 * np.median(missed), _ROUNDING) if len(missed) else 0.0
+    limit = max(_OUTLIER * 1.4826 * np.median(missed), ROUNDING) if len(missed) else 0.0
     good = ~np.isin(every.frames, every.frames[missed > limit])
     return Equations(every.design[good], every.target[good], every.frames[good])
 

@@ -34,13 +34,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import permutations
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import ArrayLike
 from tqdm import tqdm
 
-from ..arrays import Bools, Floats
+from ..arrays import Floats
 from ..progress import bar
 from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, known_to
 from .calibrate import check_learnable, closed_form, learn_cameras
@@ -57,21 +57,8 @@ from .clocks import (
     dips,
     list_lags,
 )
-from .models import Camera
-from .rig import (
-    ALIKE,
-    DISAGREEMENT,
-    FINE,
-    GROSS,
-    TRIMMED,
-    Rig,
-    at_once,
-    check_seen,
-    epipolar_lines,
-    epipolar_rows,
-    trimmed,
-)
-from .rig import missed as missed_by
+from .models import TRIMMED, Camera, at_once, epipolar_lines, epipolar_rows, missed, trimmed
+from .rig import ALIKE, BETTER, DISAGREEMENT, FINE, GROSS, Rig, check_seen
 from .unmeasured import posed
 
 _BLOCK = 200_000  # pairs of a lag and an instant at a time
@@ -81,8 +68,6 @@ _APART = 1.0  # frames; lags closer than that are one and the same
 _PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
 _CLEAR = 4.0  # standard errors by which a clock must drift, ...
 _ENOUGH = 0.05  # ... and frames over the whole video
-_LEAST = 1e-6  # share of a slope that is motion
-_USED = 0.5  # weight of an instant that holds no outlier
 _TIMES = LAG, DRIFT
 BLURRED = 0.5
 """Standard error of a lag, in frames, beyond which it counts as unknown."""
@@ -90,7 +75,6 @@ BLURRED = 0.5
 _ROUGH_STEPS = 8  # of the second step
 _SHOWN = 3  # of the lags that fit equally well
 _LOOSE = 0.05  # of tilts, log scales and angles that a hand measured: three degrees, 5 %
-_BETTER = 1.25  # times smaller residuals are a reason to doubt what was measured
 RATES = ((25, 30), (30, 25), (24, 30), (30, 24), (24, 25), (25, 24), (30, 60), (60, 30))
 """Rates over those stated that are taken for each other."""
 _MENDED = 3.0  # times by which a mistake has to mend the disagreement of all views together
@@ -101,7 +85,7 @@ _FRAMES = 1500  # of the first video at which a jump of the lag is sought
 _LONGEST = 60  # frames by which it may jump
 _MOST, _PRICE = 8.0, 40.0  # typical misses: the most that one frame counts, and the price of a jump
 _MANY = 6  # cameras, of which only two are taken for each other
-_ROUNDING = 1e-9  # pixels
+_ROUNDING = 1e-9  # scene units, or a share of a slope that is motion
 
 
 def promising_lags(footage: Footage, cameras: Sequence[Camera]) -> list[list[float]]:
@@ -165,115 +149,92 @@ def pair_missed(
     design = np.concatenate((design, extra), axis=-1)
     seen = np.isfinite(target) & np.isfinite(design).all(axis=-1)
     design, target = np.where(seen[..., None], design, 0), np.where(seen, target, 0)
-    size = np.abs(design).max(axis=(0, 1), initial=0, keepdims=True)
-    design = design / np.where(size > 0, size, 1)
-    fits, unknown = seen, design.shape[-1]
+    fits = seen
     for _ in range(2):
-        used = np.where(fits[..., None], design, 0)
-        square = used.swapaxes(-1, -2) @ used
-        right = np.einsum("kni,kn->ki", used, np.where(fits, target, 0))
-        solution = np.einsum(
-            "kij,kj->ki", np.linalg.pinv(square, rcond=1e-10, hermitian=True), right
-        )
-        missed = np.where(seen, np.abs(np.einsum("kni,ki->kn", design, solution) - target), np.nan)
-        enough = fits.sum(axis=1) > 2 * unknown
+        used, wanted = np.where(fits[..., None], design, 0), np.where(fits, target, 0)
+        solution = np.linalg.pinv(used) @ wanted[..., None]
+        missed = np.where(seen, np.abs((design @ solution)[..., 0] - target), np.nan)
+        enough = fits.sum(axis=1) > 2 * design.shape[-1]
         limit = np.nanquantile(np.where(enough[:, None], missed, 0), TRIMMED, axis=1)
         fits = seen & (missed <= limit[:, None])
     total = np.sum(np.where(fits, missed, 0) ** 2, axis=1)
     return np.where(enough, np.sqrt(total / np.maximum(fits.sum(axis=1), 1)), np.inf)
 
 
-@dataclass(frozen=True, eq=False)
-class Timing:
-    """What was fitted, and what that tells of the lags."""
+def score(fit: Adjustment) -> float:
+    """What is left, if errors are normal but for some outliers: by the better part of them."""
+    return fit.left(_BETTER_PART)
 
-    fit: Adjustment
 
-    @classmethod
-    def of(cls, fit: Adjustment) -> Timing | None:
-        """None if the views have too little in common."""
-        told = np.isfinite(fit.misses).any(axis=1).sum()
-        return cls(fit) if 3 * told > np.isinf(fit.errors[:, _TIMES]).sum() else None
+def in_common(fit: Adjustment) -> bool:
+    """Whether the views have enough in common to tell the clocks."""
+    told = np.isfinite(fit.misses).any(axis=1).sum()
+    return bool(3 * told > np.isinf(fit.errors[:, _TIMES]).sum())
 
-    @property
-    def lags(self) -> Floats:
-        """In frames."""
-        return self.fit.footage.lags
 
-    @property
-    def used(self) -> Bools:
-        """Instants that hold no outlier."""
-        return self.fit.weights > _USED
+def agrees(fit: Adjustment) -> bool:
+    """Whether residuals are small, and not like those of the next frame.
 
-    @property
-    def score(self) -> float:
-        """What is left, if errors are normal but for some outliers: by the better part of them."""
-        return self.fit.left(_BETTER_PART)
+    Noise of the tracks, however large, is no reason to look for other lags.
+    """
+    missed = fit.misses[fit.used]
+    now, then = missed[:-1], missed[1:]
+    both = np.isfinite(now) & np.isfinite(then)
+    square = max(float(np.sum((now**2)[both])), 1e-300)
+    alike = max(float(np.sum((now * then)[both])) / square, 0.0)
+    misfit = score(fit) * np.sqrt(alike / _PERSISTENT)
+    return bool(alike <= _PERSISTENT and misfit <= DISAGREEMENT and score(fit) <= GROSS)
 
-    @property
-    def agrees(self) -> bool:
-        """Whether residuals are small, and not like those of the next frame.
 
-        Noise of the tracks, however large, is no reason to look for other lags.
-        """
-        missed = self.fit.misses[self.used]
-        now, then = missed[:-1], missed[1:]
-        both = np.isfinite(now) & np.isfinite(then)
-        square = max(float(np.sum((now**2)[both])), 1e-300)
-        alike = max(float(np.sum((now * then)[both])) / square, 0.0)
-        misfit = self.score * np.sqrt(alike / _PERSISTENT)
-        return bool(alike <= _PERSISTENT and misfit <= DISAGREEMENT and self.score <= GROSS)
+def near(fit: Adjustment, lags: Floats) -> bool:
+    """Whether its lags are those."""
+    return bool(np.abs(fit.footage.lags - lags).max() < _APART)
 
-    def near(self, lags: Floats) -> bool:
-        """Whether its lags are those."""
-        return bool(np.abs(self.lags - lags).max() < _APART)
 
-    @property
-    def shares(self) -> Floats:
-        """Share of each lag's squared slope that is motion and not noise, between 0 and 1.
+def shares(fit: Adjustment) -> Floats:
+    """Share of each lag's squared slope that is motion and not noise, between 0 and 1.
 
-        Interpolated noise has a slope, too: with a variance of half of the noise's, as it is taken
-        between two frames that are two apart.
-        """
-        fit, used = self.fit, self.used
-        slopes = fit.reduced.slopes[used].reshape(-1, len(fit.prior))
-        parts = np.argwhere(fit.free)[:, 1]
-        lags, others = slopes[:, parts == LAG], slopes[:, ~np.isin(parts, _TIMES)]
-        lags = lags - others @ np.linalg.lstsq(others, lags)[0] if others.size else lags
-        # Of the two numbers of each of k views, the point leaves 2 - 3 / k.
-        seen = np.isfinite(self.fit.misses[used, ::2].T)
-        views = np.maximum(seen.sum(axis=0), 2)
-        freedom = np.maximum((seen * (2 - 3 / views)).sum(axis=1)[1:], 1e-9)
-        speeds = fit.footage.rates[1:]
-        chance = 0.5 * fit.noise**2 * speeds**2 * (freedom + 2 * np.sqrt(2 * freedom))
-        total = np.sum(lags**2, axis=0)
-        return np.clip((total - chance) / np.maximum(total, 1e-300), 0, 1)
+    Interpolated noise has a slope, too: with a variance of half of the noise's, as it is taken
+    between two frames that are two apart.
+    """
+    slopes = fit.reduced.slopes[fit.used].reshape(-1, len(fit.prior))
+    parts = np.argwhere(fit.free)[:, 1]
+    lags, others = slopes[:, parts == LAG], slopes[:, ~np.isin(parts, _TIMES)]
+    lags = lags - others @ np.linalg.lstsq(others, lags)[0] if others.size else lags
+    # Of the two numbers of each of k views, the point leaves 2 - 3 / k.
+    seen = np.isfinite(fit.misses[fit.used, ::2].T)
+    views = np.maximum(seen.sum(axis=0), 2)
+    freedom = np.maximum((seen * (2 - 3 / views)).sum(axis=1)[1:], 1e-9)
+    speeds = fit.footage.rates[1:]
+    chance = 0.5 * fit.noise**2 * speeds**2 * (freedom + 2 * np.sqrt(2 * freedom))
+    total = np.sum(lags**2, axis=0)
+    return np.clip((total - chance) / np.maximum(total, 1e-300), 0, 1)
 
-    @property
-    def covariance(self) -> Floats:
-        """Of lags and drifts, if that of cameras is known as well as the tracks tell it."""
-        covariance = self.fit.factor @ self.fit.factor.T
-        cameras, parts = np.argwhere(self.fit.free).T
-        order = np.concatenate([np.flatnonzero(parts == part) for part in _TIMES])
-        # Slopes that are noise add to the information, but mend nothing.
-        share = np.append(1.0, np.maximum(self.shares, _LEAST))[cameras[order]]
-        return covariance[np.ix_(order, order)] / np.outer(share, share)
 
-    def drifted(self) -> Timing:
-        """The same with drifts of clocks, if any are clear and large enough to matter."""
-        fit, errors = self.fit, self.fit.errors.copy()
-        errors[1:, DRIFT] = np.inf
-        free = Timing.of(adjust(fit.given, fit.start, errors, begin=fit.change))
-        if free is None:
-            return self
-        drift, off = free.fit.change[:, DRIFT], np.zeros(len(errors))
-        off[1:] = np.sqrt(np.diag(free.covariance))[len(off) - 1 :]
-        clear = np.abs(drift) > np.maximum(_CLEAR * off, _ENOUGH)
-        if not clear.any():
-            return self
-        errors[~clear, DRIFT] = 0.0
-        begin = np.where(errors > 0, free.fit.change, 0.0)
-        return Timing.of(adjust(fit.given, fit.start, errors, begin=begin)) or self
+def covariance(fit: Adjustment) -> Floats:
+    """Of lags and drifts, if that of cameras is known as well as the tracks tell it."""
+    cameras, parts = np.argwhere(fit.free).T
+    order = np.concatenate([np.flatnonzero(parts == part) for part in _TIMES])
+    # Slopes that are noise add to the information, but mend nothing.
+    share = np.append(1.0, np.maximum(shares(fit), _ROUNDING))[cameras[order]]
+    factor = fit.factor[order] / share[:, None]
+    return factor @ factor.T
+
+
+def drifted(fit: Adjustment) -> Adjustment:
+    """The same with drifts of clocks, if any are clear and large enough to matter."""
+    errors, off = fit.errors.copy(), np.zeros(len(fit.errors))
+    errors[1:, DRIFT] = np.inf
+    free = adjust(fit.given, fit.start, errors, begin=fit.change)
+    if not in_common(free):
+        return fit
+    off[1:] = np.sqrt(np.diag(covariance(free)))[len(off) - 1 :]
+    clear = np.abs(free.change[:, DRIFT]) > np.maximum(_CLEAR * off, _ENOUGH)
+    if not clear.any():
+        return fit
+    errors[~clear, DRIFT] = 0.0
+    found = adjust(fit.given, fit.start, errors, begin=np.where(errors > 0, free.change, 0.0))
+    return found if in_common(found) else fit
 
 
 def learn_lags(
@@ -381,7 +342,7 @@ class _Videos:
             errors[ways & (errors == 0)] = _LOOSE
         return errors
 
-    def fitted(self, lags: Floats, rough: bool = False, loose: bool = False) -> Timing | None:
+    def fitted(self, lags: Floats, rough: bool = False, loose: bool = False) -> Adjustment | None:
         """The best lags near given ones, or better ones than these; None if nothing fits."""
         if self.shown is not None:
             self.shown.update()
@@ -390,7 +351,8 @@ class _Videos:
         if cameras is None:
             return None
         most = _ROUGH_STEPS if rough else STEPS
-        return Timing.of(adjust(footage, cameras, self.errors(rough, loose), most=most))
+        found = adjust(footage, cameras, self.errors(rough, loose), most=most)
+        return found if in_common(found) else None
 
 
 # ------------------------------------------------------------------------------------- the search
@@ -399,28 +361,28 @@ class _Videos:
 def _learned(videos: _Videos, first: Floats) -> Lags:
     """`learn_lags` of what was checked."""
     begun = videos.fitted(first)
-    if begun is not None and begun.agrees and (begun.near(first) or not begun.shares.all()):
-        return _told(videos, begun.drifted(), first)
+    if begun is not None and agrees(begun) and (near(begun, first) or not shares(begun).all()):
+        return _told(videos, drifted(begun), first)
     loose, sampled = _searched(videos, first)
     if not sampled:
         return _untold(videos, first, False)
-    close = [s for s in sampled if s.score <= max(2 * ALIKE * sampled[0].score, FINE)]
-    small = sorted(close, key=lambda s: np.abs(s.lags).sum())
+    close = [s for s in sampled if score(s) <= max(2 * ALIKE * score(sampled[0]), FINE)]
+    small = sorted(close, key=_moved)
     chosen = _different(close[:_SHOWN] + small[:_SHOWN])
-    every = [videos.fitted(s.lags, loose=loose) for s in chosen]
-    found = sorted(_different([f for f in every if f]), key=lambda f: f.score)
+    every = [videos.fitted(s.footage.lags, loose=loose) for s in chosen]
+    found = sorted(_different([f for f in every if f]), key=score)
     if not found:
         return _untold(videos, first, False)
-    if not found[0].agrees:  # as no lag does, where clocks drift by more than a part of a frame
-        found = sorted((f.drifted() for f in found), key=lambda f: f.score)
-    alike = [f for f in found if f.score <= max(ALIKE * found[0].score, FINE)]
-    if len(alike) > 1 and found[0].score > DISAGREEMENT:
+    if not agrees(found[0]):  # as no lag does, where clocks drift by more than a part of a frame
+        found = sorted(map(drifted, found), key=score)
+    alike = [f for f in found if score(f) <= max(ALIKE * score(found[0]), FINE)]
+    if len(alike) > 1 and score(found[0]) > DISAGREEMENT:
         return _untold(videos, first, False)
-    best = min(alike, key=lambda f: (not f.near(first), np.abs(f.lags).sum()))
-    told = _told(videos, best.drifted(), first)
-    if len(alike) > 1 and not best.near(first):
+    best = min(alike, key=lambda f: (not near(f, first), _moved(f)))
+    told = _told(videos, drifted(best), first)
+    if len(alike) > 1 and not near(best, first):
         choices = [best, *(f for f in alike if f is not best)][:_SHOWN]
-        lags = " or ".join(f"({list_lags(f.lags)})" for f in choices)
+        lags = " or ".join(f"({list_lags(f.footage.lags)})" for f in choices)
         warning = (
             f"the lags of the videos cannot be told: {lags} frames fit about equally well, because "
             "the motion repeats itself; give the lags if you know them"
@@ -429,39 +391,39 @@ def _learned(videos: _Videos, first: Floats) -> Lags:
     return told
 
 
-def _searched(videos: _Videos, first: Floats) -> tuple[bool, list[Timing]]:
+def _searched(videos: _Videos, first: Floats) -> tuple[bool, list[Adjustment]]:
     """Whether cameras should be loose, and fits to some of the instants, the best first."""
     promising = promising_lags(videos.given, videos.known)
     exact = _climbed(videos, promising, first, False)
-    if not exact or exact[0].score <= FINE:
+    if not exact or score(exact[0]) <= FINE:
         return False, exact
-    if exact[0].score <= DISAGREEMENT:
-        other = videos.fitted(exact[0].lags, rough=True, loose=True)
-        if other is None or other.score * _BETTER >= exact[0].score:
+    if score(exact[0]) <= DISAGREEMENT:
+        other = videos.fitted(exact[0].footage.lags, rough=True, loose=True)
+        if other is None or score(other) * BETTER >= score(exact[0]):
             return False, exact
     # Where the rig is wrong, its best lags may be wrong as well: so all are tried again.
     loose = _climbed(videos, promising, first, True)
-    if loose and loose[0].score * _BETTER < exact[0].score:
+    if loose and score(loose[0]) * BETTER < score(exact[0]):
         return True, loose
     return False, exact
 
 
 def _climbed(
     videos: _Videos, promising: list[list[float]], first: Floats, loose: bool
-) -> list[Timing]:
+) -> list[Adjustment]:
     """Fits to some instants from the most promising lags and all that differ from the best in one.
 
     The best are tried in all combinations with the others' until none is better.
     """
     count = len(promising)
-    tried: dict[tuple[float, ...], Timing | None] = {}
+    tried: dict[tuple[float, ...], Adjustment | None] = {}
 
     def fits(lags: Floats) -> float:
         key = tuple((lags - lags[0]).tolist())
         if key not in tried:
             tried[key] = videos.fitted(np.array(key), True, loose)
         found = tried[key]
-        return np.inf if found is None else found.fit.left()
+        return np.inf if found is None else found.left()
 
     best = np.array([lags[0] for lags in promising])
     fits(first)
@@ -472,15 +434,19 @@ def _climbed(
         if winner == 0:
             break
         best = every[winner]
-    found = sorted((f for f in tried.values() if f is not None), key=lambda f: f.score)
-    return _different(found)
+    return _different(sorted((f for f in tried.values() if f is not None), key=score))
 
 
-def _different(found: list[Timing]) -> list[Timing]:
+def _moved(fit: Adjustment) -> float:
+    """By how many frames all videos are late, together."""
+    return float(np.abs(fit.footage.lags).sum())
+
+
+def _different(found: list[Adjustment]) -> list[Adjustment]:
     """The first of all that have the same lags."""
-    kept: list[Timing] = []
+    kept: list[Adjustment] = []
     for one in found:
-        if not any(one.near(other.lags) for other in kept):
+        if not any(near(one, other.footage.lags) for other in kept):
             kept.append(one)
     return kept
 
@@ -488,24 +454,23 @@ def _different(found: list[Timing]) -> list[Timing]:
 # --------------------------------------------------------------------- errors, and what is told
 
 
-def _told(videos: _Videos, found: Timing, first: Floats) -> Lags:
+def _told(videos: _Videos, fit: Adjustment, first: Floats) -> Lags:
     """What a fit tells of the lags, or that it tells nothing."""
-    fit, lags = found.fit, found.lags.copy()
-    count = len(lags) - 1
-    if not found.shares.all():
-        return _untold(videos, first, found.score <= DISAGREEMENT)
-    covariance, rate_errors = found.covariance, np.zeros(len(lags))
+    lags, count = fit.footage.lags.copy(), len(first) - 1
+    if not shares(fit).all():
+        return _untold(videos, first, score(fit) <= DISAGREEMENT)
+    together, rate_errors = covariance(fit), np.zeros(len(lags))
     drifting = fit.errors[:, DRIFT] > 0
-    rate_errors[drifting] = np.sqrt(np.diag(covariance)[count:]) / fit.footage.span
+    rate_errors[drifting] = np.sqrt(np.diag(together)[count:]) / fit.footage.span
     # Lags are those of the first instant, those of the fit of the middle.
     moved = np.hstack((np.eye(count), -np.eye(count)[:, drifting[1:]] * fit.footage.middle
                        / fit.footage.span))  # fmt: skip
-    information = np.linalg.pinv(moved @ covariance @ moved.T, hermitian=True)
+    information = np.linalg.pinv(moved @ together @ moved.T, hermitian=True)
     errors = np.sqrt(np.concatenate(([0.0], np.diag(np.linalg.pinv(information, hermitian=True)))))
     # Schwarz's criterion: a fraction is one more unknown per video.
     rounded = np.rint(lags) + 0.0  # and not -0
     beside = (rounded - lags)[1:]
-    if beside @ information @ beside < count * np.log(found.used.sum()):
+    if beside @ information @ beside < count * np.log(fit.used.sum()):
         lags = rounded
     blurred = np.flatnonzero(errors > BLURRED)
     warnings = [_blurred(int(i), lags) for i in blurred]
@@ -515,7 +480,7 @@ def _told(videos: _Videos, found: Timing, first: Floats) -> Lags:
             "the lags if you know them"
         )
     return Lags(
-        lags, fit.footage.rates, errors, found.fit.left(), tuple(warnings), rate_errors=rate_errors
+        lags, fit.footage.rates, errors, fit.left(), tuple(warnings), rate_errors=rate_errors
     )
 
 
@@ -525,8 +490,7 @@ def _untold(videos: _Videos, lags: Floats, agree: bool) -> Lags:
     residual, footage = np.inf, videos.footage(lags)
     cameras = videos.cameras(footage)
     if cameras is not None:
-        missed = missed_by(cameras, footage.aligned)
-        residual = max(map(trimmed, missed))
+        residual = max(map(trimmed, missed(cameras, footage.aligned)))
     warnings = [_blurred(i, lags) for i in range(1, len(lags))]
     if not agree:
         left = f"leave {residual:.2g} pixels" if residual < np.inf else "no cameras fit"
@@ -569,9 +533,9 @@ class Mistake:
         """By how much two views disagree at their best lags, all pairs; and these lags."""
         footage = Footage.of(self.tracks, None, self.rates, self.clocks)
         least, lags = [], []
-        for tried, missed in lag_misses(footage, cameras, _INSTANTS):
-            least.append(missed.min())
-            lags.append(tried[missed.argmin()])
+        for tried, left in lag_misses(footage, cameras, _INSTANTS):
+            least.append(left.min())
+            lags.append(tried[left.argmin()])
         behind = np.insert(lags, first_known(cameras), 0.0)
         return float(np.linalg.norm(least)), behind - behind[0]
 
@@ -579,7 +543,7 @@ class Mistake:
         """Pixels by which the worst view disagrees near these lags."""
         videos = _Videos.of(self.tracks, rig, self.rates, self.clocks)
         found = videos.fitted(lags, rough=True)
-        return np.inf if found is None else found.fit.left()
+        return np.inf if found is None else found.left()
 
 
 def find_mistake(
@@ -601,28 +565,22 @@ def find_mistake(
     """
     none = Mistake("", tuple(tracks), rates, check_clocks(clocks, tracks))
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
-        return _found(none, rig, start, names)
-    return None
-
-
-def _found(none: Mistake, rig: Rig, start: Floats, names: Sequence[str]) -> Mistake | None:
-    """The same, where the tracks can be compared."""
-    if none.left(rig, start) <= 2 * DISAGREEMENT:
-        return None
-    _, lags = none.paired(rig.cameras)
-    left = none.left(rig, lags)
-    if left <= 2 * DISAGREEMENT:
-        return None
-    for kind in (_views, _rates, _dropped):
-        # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse none.
-        ranked = [(*one.paired(rig.cameras), one) for one in kind(none, rig, names)]
-        ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
-        tried = [(one.left(rig, best), best, one) for _, best, one in ranked]
-        for now, best, one in sorted(tried, key=lambda one: one[0]):
-            if _MENDED * now < left:
-                told = learn_lags(one.tracks, rig, one.rates, best, one.clocks)
-                if told.residual <= DISAGREEMENT:
-                    return replace(one, lags=told, before=left)
+        if none.left(rig, start) <= 2 * DISAGREEMENT:
+            return None
+        left = none.left(rig, none.paired(rig.cameras)[1])
+        if left <= 2 * DISAGREEMENT:
+            return None
+        for kind in (_views, _rates, _dropped):
+            # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
+            # none.
+            ranked = [(*one.paired(rig.cameras), one) for one in kind(none, rig, names)]
+            ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
+            tried = [(one.left(rig, best), best, one) for _, best, one in ranked]
+            for now, best, one in sorted(tried, key=lambda one: one[0]):
+                if _MENDED * now < left:
+                    told = learn_lags(one.tracks, rig, one.rates, best, one.clocks)
+                    if told.residual <= DISAGREEMENT:
+                        return replace(one, lags=told, before=left)
     return None
 
 
@@ -637,33 +595,32 @@ def _views(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
             what = f"{' and '.join(names[i] for i in moved)} {how}"
             yield Mistake(what, tracks, rates, clocks)
     known = {i for i, camera in enumerate(rig.cameras) if camera.is_calibrated}
-    for axis, what in ((0, "mirrored"), (1, "with v counted upwards")):
-        for views in [*([i] for i in range(count)), [*range(count)]]:
-            told, how = names[views[0]] if len(views) == 1 else "all views", what
-            if len(views) == 1 and not known & {*views}:
-                # Half a turn from a mirrored view is one with v counted upwards.
-                how = "mirrored, or with v counted upwards"
-            elif len(views) == 1 and known <= {*views}:
-                how = "mirrored, or with v counted upwards: then the path has the other sign"
-            if axis == 1 and how != what:
-                continue
-            given = list(none.tracks)
-            for i in views:
-                turned = [given[i][:, 0], given[i][:, 1]]
-                turned[axis] = sizes[i][axis] - 1 - turned[axis]
-                given[i] = np.column_stack(turned)
-            yield replace(none, what=f"{told} {how}", tracks=tuple(given))
+    for views in (*({i} for i in range(count)), {*range(count)}):
+        told, ways = "all views", ["mirrored", "with v counted upwards"]
+        if len(views) == 1:
+            told = names[min(views)]
+            # Half a turn from a mirrored view is one with v counted upwards: an angle that is
+            # learned takes it up, or those of all others do.
+            if known <= views:
+                ways = [", or ".join(ways) + ": then the path has the other sign"]
+            elif not known & views:
+                ways = [", or ".join(ways)]
+        for axis, how in enumerate(ways):
+            tracks = tuple(
+                np.where(np.arange(2) == axis, np.array(size) - 1 - track, track)
+                if i in views else track
+                for i, (track, size) in enumerate(zip(none.tracks, sizes, strict=True))
+            )  # fmt: skip
+            yield replace(none, what=f"{told} {how}", tracks=tracks)
 
 
 def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
     """Orders in which two views change places, or three in a ring; and which these are."""
     for size in (2, 3) if count < _MANY else (2,):
-        for ring in permutations(range(count), size):
-            if ring[0] == min(ring):  # the others are the same ones
-                order = [*range(count)]
-                for i, j in zip(ring, (*ring[1:], ring[0]), strict=True):
-                    order[i] = j
-                yield tuple(sorted(ring)), order
+        for moved, turn in product(combinations(range(count), size), range(1, size)):
+            order = np.arange(count)
+            order[[*moved]] = np.roll(moved, turn)
+            yield moved, order.tolist()
 
 
 def _rates(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
@@ -738,9 +695,5 @@ def _jumps(
     path = [int(total.argmin())]
     for step in before[::-1]:
         path.append(int(step[path[-1]]))
-    path = path[::-1]
-    return [
-        (float(frames[k]), float(path[k] - path[k - 1]))
-        for k in range(1, len(path))
-        if path[k] != path[k - 1]
-    ]
+    jumps = np.diff(path[::-1])
+    return [(float(frames[k + 1]), float(jumps[k])) for k in np.flatnonzero(jumps)]

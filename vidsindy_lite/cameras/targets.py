@@ -10,7 +10,7 @@ is told, the others are left out.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations, product
 from typing import NamedTuple
@@ -213,41 +213,40 @@ def _first(runs: Sequence[_Run]) -> int:
     return min(int(run.frames[0]) for run in runs)
 
 
-def _link(one: _Run, other: _Run, cameras: Rig) -> tuple[float, Sequence[int]] | None:
+def _link(one: _Run, other: _Run, cameras: Rig) -> tuple[float, list[int]] | None:
     """How sure it is which order of another view's targets is that of a view, and which one."""
     common = np.intersect1d(one.frames, other.frames, assume_unique=True)
     if one.view == other.view or len(common) < _SHORTEST:
         return None
     pair = Rig((cameras.cameras[one.view], cameras.cameras[other.view]))
-    orders = list(permutations(range(one.places.shape[1])))
-    misfits = [_misfit([one.at(common), other.at(common)[:, list(o)]], pair) for o in orders]
-    if len(orders) == 1:
-        return 1.0, orders[0]
-    best, second = np.argsort(misfits)[:2]
-    sure = float(misfits[second] / max(misfits[best], 1e-9))
-    return (sure, orders[best]) if sure > ALIKE else None
+    here, there = one.at(common), other.at(common)
+    sure, order = _surest(here.shape[1], lambda o: _misfit([here, there[:, o]], pair))
+    return (sure, order) if sure > ALIKE else None
+
+
+def _surest(count: int, misfit: Callable[[list[int]], float]) -> tuple[float, list[int]]:
+    """How many times better the best order of targets fits than the next one, and which it is."""
+    orders = [*map(list, permutations(range(count)))]
+    ranked = sorted((misfit(order), order) for order in orders)
+    second = ranked[1][0] if len(ranked) > 1 else np.inf
+    return second / max(ranked[0][0], 1e-9), ranked[0][1]
 
 
 def _on_from(
     before: Sequence[_Run], after: Sequence[_Run], cameras: Rig
-) -> tuple[Sequence[int], bool]:
+) -> tuple[list[int], bool]:
     """In which order the targets go on behind a gap in all views, and whether that is sure."""
     start = _first(after)
     there, x = _in_space(before, cameras)
     here, y = _in_space(after, cameras)
     x, there = x[there < start][-_AHEAD:], there[there < start][-_AHEAD:]
     y, here = y[:_AHEAD], here[:_AHEAD]
-    orders = list(permutations(range(y.shape[1])))
-    if len(orders) == 1:
-        return orders[0], True
-    if (
-        min(len(x), len(y)) < _DEGREE or here[0] - there[-1] > 4 * _AHEAD
-    ):  # too long for these to tell anything
-        return orders[0], False
-    frames = np.concatenate((there, here))
-    rough = [_roughness(frames, np.concatenate((x, y[:, list(order)]))) for order in orders]
-    best, second = np.argsort(rough)[:2]
-    return orders[best], bool(rough[best] * ALIKE < rough[second])
+    count, frames = y.shape[1], np.concatenate((there, here))
+    # One goes on wherever it is; of several, too long a gap tells nothing.
+    if count == 1 or min(len(x), len(y)) < _DEGREE or here[0] - there[-1] > 4 * _AHEAD:
+        return [*range(count)], count == 1
+    sure, order = _surest(count, lambda o: _roughness(frames, np.concatenate((x, y[:, o]))))
+    return order, sure > ALIKE
 
 
 def _in_space(runs: Sequence[_Run], cameras: Rig) -> tuple[Ints, Floats]:

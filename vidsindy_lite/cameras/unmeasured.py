@@ -27,8 +27,7 @@ Kanade 1992, IJCV 9 (factorisation).
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from itertools import combinations, product
 from typing import Any, NamedTuple
 
@@ -40,8 +39,8 @@ from scipy.optimize import least_squares
 from ..arrays import Floats
 from .adjust import PARTS, Adjustment, adjust, known_to
 from .clocks import OVERLAP, Footage, Lags, check_clocks, dips
-from .models import AffineCamera, PerspectiveCamera
-from .rig import ALIKE, FINE, GROSS, Rig, at_once, check_views, missed
+from .models import AffineCamera, PerspectiveCamera, at_once, missed
+from .rig import ALIKE, BETTER, FINE, GROSS, Rig, check_views
 
 _FEWEST = 8  # frames in common of a pair
 _UNKNOWN = 45.0  # degrees
@@ -59,7 +58,6 @@ _EITHER_HAND = (
 )
 _Pose = tuple[NDArray[Any], NDArray[Any]]  # OpenCV's rotation and shift
 _PROMISING = 20  # lags of each view
-_BETTER = 1.25  # times less noise is a reason for one more direction of motion
 _MOVES = 5.0  # times what is left by which a target must move, rms, in every view
 _NOTE = (
     "nothing is known of the cameras: the path is known but for an affine map, its axes are those "
@@ -323,13 +321,12 @@ def factorised(
         See `align`; lags are found if they are not given.
     """
     films = Footage.of(tracks, None, rates, check_clocks(clocks, tracks))
-    views = _Views(films.some)
-    ranks = range(1, 4)
+    some, ranks = films.some, range(1, 4)
     found = [
-        views.best(rank) if lags is None else (views.left(lags, range(len(tracks)), rank), lags)
+        _best(some, rank) if lags is None else (_left(some, lags, range(len(tracks)), rank), lags)
         for rank in ranks
     ]
-    enough = max(_BETTER * found[-1][0], FINE)
+    enough = max(BETTER * found[-1][0], FINE)
     rank = next(rank for rank, (left, _) in zip(ranks, found, strict=True) if left <= enough)
     left, best = found[rank - 1]
     if not np.isfinite(left):
@@ -352,7 +349,7 @@ def factorised(
         )
         for i, camera in enumerate(rig.cameras)
     ]  # fmt: skip
-    errors = views.errors(best, rank) if lags is None else np.zeros(count)
+    errors = _errors(some, best, rank) if lags is None else np.zeros(count)
     doubts = () if left <= GROSS else (
         f"views agree on one motion but for {left:.2g} pixels of noise: look at the tracks",
     )  # fmt: skip
@@ -360,92 +357,91 @@ def factorised(
     return Factorised(Rig(tuple(cameras), note=_NOTE), told, rank)
 
 
-@dataclass(frozen=True, eq=False)
-class _Views:
-    """All views at some instants, (n,), as a function of their lags."""
+def _least(footage: Footage) -> float:
+    """Frames of the first video that all must show."""
+    return OVERLAP * float(footage.lengths.min())
 
-    footage: Footage
 
-    @cached_property
-    def least(self) -> float:
-        """Frames of the first video that all must show."""
-        return OVERLAP * float(self.footage.lengths.min())
+def _left(footage: Footage, lags: Floats, places: Sequence[int], rank: int) -> float:
+    """Noise of the pixels that is left beyond a rank; infinite of too few common frames."""
+    beyond = _beyond(footage, lags, places, rank)
+    count, width = np.isfinite(beyond[:, 0]).sum(), beyond.shape[1]
+    step = footage.span / max(len(footage.instants) - 1, 1)
+    if count <= width or count * step < _least(footage):
+        return np.inf
+    return float(np.sqrt(np.nansum(beyond**2) / (count * (width - rank))))
 
-    def left(self, lags: Floats, places: Sequence[int], rank: int) -> float:
-        """Noise of the pixels that is left beyond a rank; infinite of too few common frames."""
-        beyond = self.beyond(lags, places, rank)
-        count, width = np.isfinite(beyond[:, 0]).sum(), beyond.shape[1]
-        step = self.footage.span / max(len(self.footage.instants) - 1, 1)
-        if count <= width or count * step < self.least:
-            return np.inf
-        return float(np.sqrt(np.nansum(beyond**2) / (count * (width - rank))))
 
-    def best(self, rank: int) -> tuple[float, Floats]:
-        """What the lags leave beyond a rank that leave least, and those lags.
+def _best(footage: Footage, rank: int) -> tuple[float, Floats]:
+    """What the lags leave beyond a rank that leave least, and those lags.
 
-        Of two views, lags are promising that leave less than their neighbours; of three, these are
-        tried together, and further views one by one. Of those that leave about as little, the
-        shortest count.
-        """
-        count = len(self.footage.curves)
-        lags = np.zeros(count)
-        promising = [self._promising(i, rank)[:_PROMISING] or [0.0] for i in range(1, count)]
-        for last in range(3, count + 1):
-            tried = []
-            for new in product(*promising[:2]) if last == 3 else product(promising[last - 2]):
-                lags[last - len(new) : last] = new
-                tried.append((self.left(lags, range(last), rank), tuple(lags)))
-            starts = [np.array(one) for _, one in sorted(tried)[:_LAGS]]
-            found = [self._polished(one, last, rank) for one in starts]
-            left = np.array([self.left(one, range(last), rank) for one in found])
-            alike = np.flatnonzero(left <= max(ALIKE * left.min(), FINE))
-            shortest = min(alike, key=lambda k: np.abs(found[k]).sum())
-            lags, least = found[shortest], float(left[shortest])
-        return least, lags
+    Of two views, lags are promising that leave less than their neighbours; of three, these are
+    tried together, and further views one by one. Of those that leave about as little, the
+    shortest count.
+    """
+    count = len(footage.curves)
+    lags = np.zeros(count)
+    promising = [_promising(footage, i, rank)[:_PROMISING] or [0.0] for i in range(1, count)]
+    for last in range(3, count + 1):
+        tried = []
+        for new in product(*promising[:2]) if last == 3 else product(promising[last - 2]):
+            lags[last - len(new) : last] = new
+            tried.append((_left(footage, lags, range(last), rank), tuple(lags)))
+        starts = [np.array(one) for _, one in sorted(tried)[:_LAGS]]
+        found = [_polished(footage, one, last, rank) for one in starts]
+        left = np.array([_left(footage, one, range(last), rank) for one in found])
+        alike = np.flatnonzero(left <= max(ALIKE * left.min(), FINE))
+        shortest = min(alike, key=lambda k: np.abs(found[k]).sum())
+        lags, least = found[shortest], float(left[shortest])
+    return least, lags
 
-    def _promising(self, i: int, rank: int) -> list[float]:
-        """Whole lags of a view at which less is left than at their neighbours, the best first."""
-        lengths = self.footage.lengths
-        tried = np.arange(np.ceil(self.least - lengths[i]), lengths[0] - self.least + 1)
-        every = np.zeros((len(tried), len(lengths)))
-        every[:, i] = tried
-        return dips(tried, np.array([self.left(lags, (0, i), rank) for lags in every]))
 
-    def _polished(self, lags: Floats, count: int, rank: int) -> Floats:
-        """The lags of so many views, to fractions of a frame, that leave least near by."""
+def _promising(footage: Footage, i: int, rank: int) -> list[float]:
+    """Whole lags of a view at which less is left than at their neighbours, the best first."""
+    lengths = footage.lengths
+    tried = np.arange(np.ceil(_least(footage) - lengths[i]), lengths[0] - _least(footage) + 1)
+    every = np.zeros((len(tried), len(lengths)))
+    every[:, i] = tried
+    return dips(tried, np.array([_left(footage, lags, (0, i), rank) for lags in every]))
 
-        def beyond(others: Floats) -> Floats:
-            late = np.concatenate(([0.0], others, lags[count:]))
-            return np.nan_to_num(self.beyond(late, range(count), rank)).ravel()
 
-        found = least_squares(beyond, lags[1:count], diff_step=1e-3, max_nfev=_STEPS)
-        return np.concatenate(([0.0], found.x, lags[count:]))
+def _polished(footage: Footage, lags: Floats, count: int, rank: int) -> Floats:
+    """The lags of so many views, to fractions of a frame, that leave least near by."""
 
-    def beyond(self, lags: Floats, places: Sequence[int], rank: int) -> Floats:
-        """Tracks of some views side by side, (n, 2 m), without their mean and so many directions.
+    def beyond(others: Floats) -> Floats:
+        late = np.concatenate(([0.0], others, lags[count:]))
+        return np.nan_to_num(_beyond(footage, late, range(count), rank)).ravel()
 
-        NaN where a view is missing.
-        """
-        late = replace(self.footage, lags=lags)
-        matrix = np.hstack([late.curves[i].at(late.frames(i)) for i in places])
-        seen = np.isfinite(matrix).all(axis=1)
-        matrix[~seen] = np.nan
-        if seen.any():
-            centred = matrix[seen] - matrix[seen].mean(axis=0)
-            axes = np.linalg.svd(centred, full_matrices=False)[2][:rank]
-            matrix[seen] = centred - centred @ axes.T @ axes
-        return matrix
+    found = least_squares(beyond, lags[1:count], diff_step=1e-3, max_nfev=_STEPS)
+    return np.concatenate(([0.0], found.x, lags[count:]))
 
-    def errors(self, lags: Floats, rank: int) -> Floats:
-        """Standard errors of the lags, if what is left is independent noise, (m,)."""
-        every, step = range(len(lags)), 1e-2
-        here = np.nan_to_num(self.beyond(lags, every, rank))
-        moves = step * np.eye(len(lags))[1:]
-        ends = [[self.beyond(lags + s * move, every, rank) for s in (1, -1)] for move in moves]
-        slopes = np.array([(later - sooner).ravel() / (2 * step) for later, sooner in ends])
-        slopes = np.nan_to_num(slopes)
-        information = slopes @ slopes.T
-        if np.linalg.cond(information) > 1 / np.finfo(float).eps:
-            return np.append(0.0, np.full(len(slopes), np.inf))
-        variance = (here**2).sum() / max(np.count_nonzero(here) / 2, 1)
-        return np.append(0.0, np.sqrt(variance * np.diag(np.linalg.inv(information))))
+
+def _beyond(footage: Footage, lags: Floats, places: Sequence[int], rank: int) -> Floats:
+    """Tracks of some views side by side, (n, 2 m), without their mean and so many directions.
+
+    NaN where a view is missing.
+    """
+    late = replace(footage, lags=lags)
+    matrix = np.hstack([late.curves[i].at(late.frames(i)) for i in places])
+    seen = np.isfinite(matrix).all(axis=1)
+    matrix[~seen] = np.nan
+    if seen.any():
+        centred = matrix[seen] - matrix[seen].mean(axis=0)
+        axes = np.linalg.svd(centred, full_matrices=False)[2][:rank]
+        matrix[seen] = centred - centred @ axes.T @ axes
+    return matrix
+
+
+def _errors(footage: Footage, lags: Floats, rank: int) -> Floats:
+    """Standard errors of the lags, if what is left is independent noise, (m,)."""
+    every, step = range(len(lags)), 1e-2
+    here = np.nan_to_num(_beyond(footage, lags, every, rank))
+    moves = step * np.eye(len(lags))[1:]
+    ends = [[_beyond(footage, lags + s * move, every, rank) for s in (1, -1)] for move in moves]
+    slopes = np.array([(later - sooner).ravel() / (2 * step) for later, sooner in ends])
+    slopes = np.nan_to_num(slopes)
+    information = slopes @ slopes.T
+    if np.linalg.cond(information) > 1 / np.finfo(float).eps:
+        return np.append(0.0, np.full(len(slopes), np.inf))
+    variance = (here**2).sum() / max(np.count_nonzero(here) / 2, 1)
+    return np.append(0.0, np.sqrt(variance * np.diag(np.linalg.inv(information))))
