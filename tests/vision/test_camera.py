@@ -6,8 +6,7 @@ from footage import Phone, render_phone
 
 from vidsindy_lite.vision import camera
 from vidsindy_lite.vision.background import sample_frames
-from vidsindy_lite.vision.camera import trembling
-from vidsindy_lite.vision.steadying import carry
+from vidsindy_lite.vision.camera import carry, trembling
 from vidsindy_lite.vision.video import Reel, write_video
 
 SKY = Phone("sky", 40, noise=3, image_size=(320, 240), frames=60)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tiny_onnx import BOX, write_red_detector
 
-from vidsindy_lite.vision import training
+from vidsindy_lite.vision import network
 from vidsindy_lite.vision.detector import LEAST, WEIGHTS, LearnedDetector, OnnxDetector, detections
 from vidsindy_lite.vision.network import Network
 from vidsindy_lite.vision.rendering import BACKGROUNDS, SHAPES, Scene, render
@@ -57,12 +57,12 @@ def test_the_weights_are_small_and_the_log_of_their_training_is_complete():
     assert WEIGHTS.stat().st_size < 2e6
     parameters = sum(p.numel() for p in Network().parameters())
     assert LOG["parameters"] == parameters <= 300_000
-    assert LOG["frames"] == LOG["steps"] * training.BATCH
+    assert LOG["frames"] == LOG["steps"] * network.BATCH
     assert len(LOG["loss"]) * LOG["steps_per_loss"] >= LOG["steps"]
     assert LOG["loss"][-1] < 0.3 * LOG["loss"][0]
     assert set(LOG["versions"]) == {"python", "torch", "numpy", "opencv"}
-    assert LOG["backgrounds"] == list(training.SEEN_BACKGROUNDS)
-    assert LOG["shapes"] == list(training.SEEN_SHAPES)
+    assert LOG["backgrounds"] == list(network.SEEN_BACKGROUNDS)
+    assert LOG["shapes"] == list(network.SEEN_SHAPES)
 
 
 @pytest.mark.parametrize(("variance", "bound"), [(0.0, 0.5), (0.01, 0.7)])

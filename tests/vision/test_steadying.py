@@ -6,7 +6,7 @@ import pytest
 from footage import Phone, write_phone
 
 from vidsindy_lite import track
-from vidsindy_lite.vision.steadying import (
+from vidsindy_lite.vision.camera import (
     CameraMotion,
     carry,
     grounds,
@@ -14,7 +14,7 @@ from vidsindy_lite.vision.steadying import (
     stands_still,
     steadied,
 )
-from vidsindy_lite.vision.steadying import align as align_on
+from vidsindy_lite.vision.camera import align as align_on
 
 SIZE = 960, 720
 

@@ -9,25 +9,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.vision import training
+from vidsindy_lite.vision import network
 from vidsindy_lite.vision.network import anchors
 
 
 @pytest.fixture
 def small(monkeypatch):
     """Training that takes seconds."""
-    monkeypatch.setattr(training, "BATCH", 2)
-    monkeypatch.setattr(training, "_EACH", 1)
+    monkeypatch.setattr(network, "BATCH", 2)
+    monkeypatch.setattr(network, "_EACH", 1)
 
 
 def test_a_training_again_gives_the_same_weights_and_log(small, tmp_path, capsys):
-    log = training.train(tmp_path / "one.pt", seed=3, steps=2)
+    log = network.train(tmp_path / "one.pt", seed=3, steps=2)
     command = ["train-detector", "--seed", "3", "--steps", "2", "--output"]
     assert main([*command, str(tmp_path / "other.pt")]) == 0
     assert "4 frames" in capsys.readouterr().out
     one, other = (torch.load(tmp_path / f"{n}.pt", weights_only=True) for n in ("one", "other"))
     assert all(torch.equal(one[name], other[name]) for name in one)
-    training.train(tmp_path / "third.pt", seed=4, steps=2)
+    network.train(tmp_path / "third.pt", seed=4, steps=2)
     third = torch.load(tmp_path / "third.pt", weights_only=True)
     assert not torch.equal(one["where.1.bias"], third["where.1.bias"])
     assert json.loads((tmp_path / "other.json").read_text()) == log
@@ -41,18 +41,18 @@ def test_the_loss_of_perfect_predictions_is_least():
     quality = torch.exp((squared.min() - squared) / (2 * 4.4**2)).clamp(1e-6, 1 - 1e-6)
     boxes = torch.cat([centre, size], dim=1).T.expand(4, 256)
     perfect = torch.cat([boxes, quality.logit()[None]])
-    least = training.detection_loss(perfect[None], centre, size, torch.ones(1))
+    least = network.detection_loss(perfect[None], centre, size, torch.ones(1))
     assert least < 1e-3
     for row, change in enumerate((1.0, 1.0, 3.0, 3.0, 2.0)):
         worse = perfect.clone()
         worse[row] += change
-        assert training.detection_loss(worse[None], centre, size, torch.ones(1)) > least + 0.01
+        assert network.detection_loss(worse[None], centre, size, torch.ones(1)) > least + 0.01
     # The same image twice costs as much as once.
     worse, whole = perfect[None] + 0.3, torch.ones(1)
-    once = training.detection_loss(worse, centre, size, whole)
+    once = network.detection_loss(worse, centre, size, whole)
     pair = worse.tile(2, 1, 1), centre.tile(2, 1), size.tile(2, 1), whole.tile(2)
-    torch.testing.assert_close(training.detection_loss(*pair), once)
-    hidden = training.detection_loss(perfect[None], centre, size, torch.zeros(1))
+    torch.testing.assert_close(network.detection_loss(*pair), once)
+    hidden = network.detection_loss(perfect[None], centre, size, torch.zeros(1))
     assert hidden > least + 0.1
 
 
@@ -60,8 +60,8 @@ def test_the_loss_of_perfect_predictions_is_least():
 @given(seed=st.integers(0, 10_000))
 def test_training_frames_show_what_their_labels_say(seed):
     pool = np.full((1, 512, 512, 3), 128, np.uint8)
-    drawn, centre = training.training_frame(np.random.default_rng(seed), pool)
-    assert drawn.frame.shape == (training.SIDE, training.SIDE, 3)
+    drawn, centre = network.training_frame(np.random.default_rng(seed), pool)
+    assert drawn.frame.shape == (network.SIDE, network.SIDE, 3)
     assert drawn.frame.dtype == np.uint8
     assert 0 <= drawn.visible <= 1 + 1e-9
     assert np.array_equal(np.isnan(centre), np.isnan(drawn.extent))

@@ -1,4 +1,17 @@
-"""The motion of a film's camera, asked of several witnesses until one is sure.
+"""Motion of the camera: where each frame of a trembling or held camera lies in the first one.
+
+A camera is at rest unless its frames say otherwise: a map that is not needed only adds its errors.
+Several witnesses are asked until one is sure.
+
+Corners of a key frame are followed into the frames after it (Lucas-Kanade); the homography that
+most of them obey, counted by the parts of the image that they cover, is the camera's motion, since
+the target is in few of these parts however much texture it has. Where there are few corners, all
+pixels tell the motion. A new key frame is taken when little is left of the last one.
+
+Clouds, waves and plain walls have no corners, but all of their pixels together tell a motion to a
+fraction of a pixel, and how well they tell it. A shift, turn and scale, a gain and an offset of the
+light are fitted by least squares (Gauss and Newton; Lucas and Kanade 1981), from coarse to fine,
+with weights that leave aside what moves on its own.
 
 A motion can be wrong with small errors: before a smooth wall nothing but the target has corners,
 and then the target's motion is taken for the camera's. But the plate that it makes, and the one of
@@ -7,7 +20,7 @@ own is in few of these: so a motion is taken only if it explains the frames bett
 
 Two frames of a sky share little but noise, and corners of noise tell no motion. But the median of
 many frames of a camera that trembles is that sky nearly without noise, only a little blurred, and
-each frame laid on it (`steadying`) tells its own small motion. Whether that is one is for the
+each frame laid on it tells its own small motion. Whether that is one is for the
 halves of the image to say: if the camera moves, both move alike; noise, a codec's errors and what
 moves on its own are not the same in both. By how much the halves differ also says how exact the
 motion is: errors of a codec and of the plate itself reach over many pixels, which no pixel's misfit
@@ -17,31 +30,447 @@ though.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import changes, lengths, light
-from .plate import Plate
-from .steadying import (
-    PARTS,
-    PLAINLY,
-    Aligned,
-    CameraMotion,
-    Ground,
-    align,
-    at_rest,
-    carry,
-    displacement,
-    grounds,
-    pyramid,
-    rescaled,
-    stands_still,
-    steadied,
-)
+from .background import Plate, carry, changes, lengths, light
 from .video import Reel
+
+_RIM = 2  # pixels of each level that depend on what lies beyond the image
+_BEYOND = -1e6  # in place of grey levels where nothing is shown: what it has a part in is below 0
+_STEP = 8.0  # pixels by which the guess may be wrong
+PARTS = 12  # into which each side of an image is cut: of one corner, and of one error, each
+_WIDTH = 21  # reduced pixels: what is smoother than this is light
+_EXACT = 1.0  # reduced pixels by which a corner may miss its place
+_STILL = 0.25  # reduced pixels by which a corner at rest may seem to move
+_VAGUE = 3.0  # reduced pixels: a map that is known no better is not known
+PLAINLY = 10.0  # standard errors of a displacement that is one
+_MANY = 60  # corners that need no other witness
+_AGREE = 0.25  # share of the corners that must do so: of those of mere noise, 0.15 to 0.24 agree
+
+
+class Ground(NamedTuple):
+    """One level of a view on which others are laid.
+
+    Its grey levels, by what each pixel changes with shift, turn, scale and light, (6, h, w), and
+    how much each may tell.
+    """
+
+    grey: Floats32
+    slopes: Floats32
+    share: Floats32
+
+    @classmethod
+    def of(cls, grey: Floats32) -> Ground:
+        slopes = _slopes(grey)
+        power = _by_blocks(slopes[0] ** 2 + slopes[1] ** 2)
+        # Times what a usual block tells, that one block may tell at most.
+        fair = np.minimum(1, 4.0 * np.median(power) / np.maximum(power, 1e-9))
+        share = cv2.resize(fair, grey.shape[::-1], interpolation=cv2.INTER_LINEAR)
+        return cls(grey, slopes, np.asarray(share, np.float32))
+
+
+class Aligned(NamedTuple):
+    """The map (3, 3) of one view to another, and the standard error of the places it gives."""
+
+    map: Floats
+    error: float
+
+
+def pyramid(small: Image) -> list[Floats32]:
+    """Grey levels of an image at a half, a quarter, ... of its size."""
+    levels = [cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32)]
+    # Of the pyramid, the first of half the size.
+    while len(levels) <= 4 and min(levels[-1].shape) >= 32:
+        levels.append(np.asarray(cv2.pyrDown(levels[-1]), np.float32))
+    # So soft that linear interpolation neither shifts nor softens them (OpenCV's cubic one shifts).
+    return [np.asarray(cv2.GaussianBlur(level, (0, 0), 1), np.float32) for level in levels[1:]]
+
+
+def grounds(levels: list[Floats32]) -> list[Ground]:
+    """Of a `pyramid`."""
+    return [Ground.of(grey) for grey in levels]
+
+
+def align(before: list[Ground], after: list[Floats32], guess: Floats) -> Aligned | None:
+    """The map of one view to another, from a guess; None where they have little in common.
+
+    Its error is infinite where the views tell no more than the guess.
+
+    Parameters
+    ----------
+    before : list of Ground
+    after : list of ndarray
+        Of `pyramid`.
+    guess : ndarray, shape (3, 3)
+        In pixels of the images of which the pyramids are.
+    """
+    found, fitted = _as_similarity(guess, 2 * np.array(before[0].grey.shape[::-1])), None
+    for level in range(len(before), 0, -1):
+        scale, back = (np.diag([x, x, 1.0]) for x in (0.5**level, 2.0**level))
+        here = scale @ found @ back
+        # Grey levels from which on a pixel is left aside.
+        loose = 40.0 if level > 1 else 0.0
+        fitted = _fit(before[level - 1], after[level - 1], here, scale[0, 0], loose)
+        if fitted is None:
+            return None
+        found = back @ fitted.map @ scale
+    if fitted is None:  # images too small for a pyramid
+        return None
+    error = 2 * fitted.error
+    return Aligned(found, error if error < _STEP else np.inf)
+
+
+def _as_similarity(guess: Floats, size: Ints) -> Floats:
+    """The shift, turn and scale nearest to a guess in an image (width, height).
+
+    Other parts of it, as perspective, would stay as they are, since nothing is fitted to them.
+    """
+    corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * size.astype(float)
+    # As complex numbers, places are turned, scaled and shifted by a line.
+    turn, shift = np.polyfit(corners @ [1, 1j], carry(guess, corners) @ [1, 1j], 1)
+    return np.array(
+        [[turn.real, -turn.imag, shift.real], [turn.imag, turn.real, shift.imag], [0, 0, 1]]
+    )
+
+
+def _fit(
+    ground: Ground, view: Floats32, here: Floats, scale: float, loose: float
+) -> Aligned | None:
+    """One level: Gauss-Newton steps of which each refines the map by what the key's slopes say."""
+    key, slopes, share = ground
+    height, width = key.shape
+    middle = np.array([[1, 0, (width - 1) / 2], [0, 1, (height - 1) / 2], [0, 0, 1.0]])
+    to_middle = np.linalg.inv(middle)
+    steep = slopes.reshape(6, -1)
+    # What the guess may be wrong by: shift, turn and scale, gain and offset of the light.
+    sure = np.array([scale * _STEP, scale * _STEP, 0.03, 0.03, 1, 100])
+    prior = np.diag(1 / sure**2)
+    gain, offset = 1.0, 0.0
+    framed = np.full_like(view, _BEYOND)
+    inner = np.s_[_RIM:-_RIM, _RIM:-_RIM]
+    framed[inner] = view[inner]
+    within = framed >= 0
+    for step in range(6):
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        laid = cv2.warpAffine(framed, here[:2], (width, height), flags=flags, borderValue=_BEYOND)
+        shown = np.asarray(laid, np.float32)
+        known = within & (shown >= 0)
+        if np.count_nonzero(known) < 0.3 * known.size:
+            return None
+        miss = shown - gain * key - offset
+        if step == 0:
+            offset = _middle(miss[known])
+            miss -= offset
+        # Grey levels; a deviation without any noise.
+        spread = max(1.4826 * _middle(np.abs(miss[known])), 0.3)
+        bound = max(3 * spread, loose / 2**step)
+        weight = share * known / (1 + (miss / bound) ** 2) ** 2
+        heavy = steep * weight.ravel()
+        normal = heavy @ steep.T + spread**2 * prior
+        delta = np.linalg.solve(normal, heavy @ miss.ravel())
+        shift = np.array(
+            [[1 + delta[2], -delta[3], delta[0]], [delta[3], 1 + delta[2], delta[1]], [0, 0, 1]]
+        )
+        here = here @ middle @ np.linalg.inv(shift) @ to_middle
+        gain, offset = float(gain + delta[4]), float(offset + delta[5])
+        # Pixels of a level of a step that is no longer worth another.
+        if np.hypot(delta[0], delta[1]) + np.hypot(delta[2], delta[3]) * width / 2 < 0.01:
+            break
+    if loose:  # a finer level says how sure the map is
+        return Aligned(here, np.inf)
+    miss = miss - np.tensordot(delta.astype(np.float32), slopes, 1)
+    seen = _slopes(np.where(known, (shown - offset) / gain, key).astype(np.float32))
+    # Noise has slopes, too, but not the same in both views.
+    told = heavy @ seen.reshape(6, -1).T
+    value, direction = np.linalg.eigh((told + told.T) / 2)
+    information = (direction * np.maximum(value, 0)) @ direction.T / spread**2 + prior
+    telling = _by_blocks(weight * (seen[0] * slopes[0] + seen[1] * slopes[1]))
+    # Blocks of mere noise tell as much for the map as against it.
+    # Share of the blocks that must tell: what few of them tell may move on its own.
+    if telling.mean() <= np.sqrt(0.1 * (telling**2).mean()):
+        return Aligned(here, np.inf)
+    return Aligned(here, _error(slopes, weight * miss / spread**2, information))
+
+
+def _middle(values: Floats | Floats32) -> float:
+    """The median of every other value, in a fifth of numpy's time."""
+    half = values[::2]
+    k = len(half) // 2
+    parts = np.partition(half, k)
+    return float(parts[k] if len(half) % 2 else (parts[:k].max() + parts[k]) / 2)
+
+
+def _by_blocks(values: Floats32) -> Floats32:
+    """The means (12, 12) of an image over its blocks."""
+    blocks = cv2.resize(values, (PARTS, PARTS), interpolation=cv2.INTER_AREA)
+    return np.asarray(blocks, np.float32)
+
+
+def _slopes(view: Floats32) -> Floats32:
+    """By what each pixel changes with shift, turn, scale about the middle, and light, (6, h, w)."""
+    height, width = view.shape
+    u = np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2)
+    v = (np.arange(height, dtype=np.float32) - np.float32((height - 1) / 2))[:, None]
+    gu, gv = (0.5 * cv2.Sobel(view, cv2.CV_32F, *by, ksize=1) for by in ((1, 0), (0, 1)))
+    return np.stack([gu, gv, gu * u + gv * v, gv * u - gu * v, view, np.ones_like(view)])
+
+
+def _error(slopes: Floats32, pull: Floats32, information: Floats) -> float:
+    """Standard error of the places of a map, if errors within a block may be the same.
+
+    `pull` (h, w) of each pixel; what the pixels do not tell is known by the guess only.
+    """
+    height, width = (side // PARTS for side in pull.shape)
+    if not height or not width:
+        return np.inf
+    pulls = (slopes * pull)[:, : height * PARTS, : width * PARTS]
+    means = np.array([_by_blocks(by) for by in pulls], float).reshape(6, -1)
+    sums = height * width * means
+    covariance = np.linalg.inv(information)
+    blockwise = covariance @ (sums @ sums.T) @ covariance
+    variance = np.maximum(np.diag(blockwise), np.diag(covariance))
+    far = (pull.shape[0] ** 2 + pull.shape[1] ** 2 - 2) / 12  # mean square from the middle
+    return float(np.sqrt((variance[0] + variance[1] + far * (variance[2] + variance[3])) / 2))
+
+
+class CameraMotion(NamedTuple):
+    """Where each frame lies in the first one.
+
+    `maps` (n, 3, 3) take homogeneous pixels of a frame to pixels of the first; `errors` (n,) are
+    the standard errors of the places that they give, in pixels: infinite where nothing is known.
+    """
+
+    maps: Floats
+    errors: Floats
+
+    @classmethod
+    def of(cls, maps: Floats, errors: Floats, factor: int) -> CameraMotion:
+        """By maps of frames that are reduced by a factor, and errors in their pixels."""
+        larger = rescaled(maps, 1 / factor)
+        return cls(larger / larger[:, 2:, 2:], factor * errors)
+
+    @property
+    def moves(self) -> bool:
+        """Does the camera move at all?"""
+        return not np.array_equal(self.maps, np.broadcast_to(np.eye(3), self.maps.shape))
+
+
+def at_rest(n: int) -> CameraMotion:
+    """The motion of a camera that stands still."""
+    return CameraMotion(np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros(n))
+
+
+def rescaled(maps: Floats, factor: float) -> Floats:
+    """Maps (n, 3, 3) of pixels of an image as maps of those of the image reduced by a factor."""
+    larger = np.array([[factor, 0, (factor - 1) / 2], [0, factor, (factor - 1) / 2], [0, 0, 1]])
+    return np.asarray(np.linalg.inv(larger) @ maps @ larger, float)
+
+
+class _Relief(NamedTuple):
+    """A reduced frame: what stands out from its surroundings, whatever the light; grey levels."""
+
+    fine: Image
+    levels: list[Floats32]
+
+    @classmethod
+    def of(cls, small: Image) -> _Relief:
+        grey = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32)
+        grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), 1))
+        mean = cv2.blur(cv2.blur(grey, (_WIDTH, _WIDTH)), (_WIDTH, _WIDTH))
+        fine = np.clip(128 + 250 * (grey - mean) / (mean + 20), 0, 255)  # below 20, all is dark
+        return cls(fine.astype(np.uint8), pyramid(small))
+
+
+def _corners(grey: Image) -> Floats:
+    """The best corner of each part of the image that has one, (m, 2): none counts twice."""
+    sharp = cv2.cornerMinEigenVal(grey, 9, ksize=3)
+    height, width = (side // PARTS for side in grey.shape)
+    if not height or not width:
+        return np.zeros((0, 2))
+    whole = np.asarray(sharp)[: height * PARTS, : width * PARTS]
+    parts = whole.reshape(PARTS, height, PARTS, width).swapaxes(1, 2).reshape(PARTS**2, -1)
+    best = parts.argmax(axis=1)
+    row, column = np.divmod(np.arange(PARTS**2), PARTS)
+    found = np.column_stack([column * width + best % width, row * height + best // width])
+    # Smallest eigenvalue of the gradient's covariance in a corner, grey levels squared.
+    return found[parts.max(axis=1) > 2.0 / 255**2].astype(float)
+
+
+def _follow(before: Image, after: Image, points: Floats, guess: Floats) -> tuple[Floats, Bools]:
+    """Where the corners are in another image, and which were found."""
+    if not len(points):
+        return points, np.zeros(0, bool)
+    flown, found, _ = cv2.calcOpticalFlowPyrLK(
+        before, after, points.astype(np.float32)[:, None], guess.astype(np.float32)[:, None].copy(),
+        winSize=(15, 15), maxLevel=3, flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+    )  # fmt: skip
+    ends = np.asarray(flown[:, 0], float)
+    size = np.array(after.shape[1::-1])
+    within = ((ends >= 0) & (ends < size)).all(axis=1)
+    return ends, (np.asarray(found)[:, 0] > 0) & within
+
+
+def stands_still(samples: Iterable[Image]) -> bool | None:
+    """Does no pair of reduced samples, successive or far apart, show that the camera moves?
+
+    It moves if clearly more corners share a motion than stay where they are. None if most pairs
+    are too plain to tell.
+    """
+    reliefs = [_Relief.of(sample) for sample in samples]
+    pairs = list(zip(reliefs, reliefs[1:], strict=False))
+    middle = reliefs[len(reliefs) // 2]
+    found = []
+    for before, after in [(reliefs[0], middle), (middle, reliefs[-1]), *pairs]:
+        found.append(_moved(before, after))
+        if found[-1]:
+            return False
+    return True if 2 * found.count(None) < len(found) else None
+
+
+def _moved(before: _Relief, after: _Relief) -> bool | None:
+    points = _corners(before.fine)
+    ends, found = _follow(before.fine, after.fine, points, points)
+    a, b = points[found], ends[found]
+    similar, _ = _similar(a, b, 2 * _STILL)
+    if similar is None:
+        return _drifted(before, after)
+    still = np.linalg.norm(b - a, axis=1) < _STILL
+    share = np.linalg.norm(carry(similar, a) - b, axis=1) < _STILL
+    moves = bool(still.sum() < 0.7 * share.sum())
+    # Corners that must share a motion, if it is to be the camera's.
+    few = share.sum() < max(10, moves * _AGREE * len(a))
+    if few or (moves and not _widespread(a[share], before.fine.shape)):
+        return _drifted(before, after)
+    return moves
+
+
+def _widespread(points: Floats, shape: Sequence[int]) -> bool:
+    """Are points spread over an image (height, width)? Those of one large thing are not."""
+    image = np.linalg.norm(shape) / np.sqrt(12)
+    # Times the image's own spread, that of corners that tell the camera's motion at least.
+    return bool(np.sqrt(points.var(axis=0).sum()) > 0.6 * image)
+
+
+def _drifted(before: _Relief, after: _Relief) -> bool | None:
+    """Do all pixels tell of a motion, where corners are few? None if these are mute, too."""
+    found = align(grounds(before.levels), after.levels, np.eye(3))
+    if found is None or found.error > _VAGUE:
+        return None
+    moved = displacement(found.map[None], before.fine.shape[::-1])[0]
+    return bool(moved > PLAINLY / 2 * found.error)
+
+
+def displacement(maps: Floats, size: Sequence[int]) -> Floats:
+    """Pixels by which maps (n, 3, 3) move an image (width, height), rms of its parts."""
+    grid = np.array([[u, v] for u in (0.2, 0.5, 0.8) for v in (0.2, 0.5, 0.8)])
+    points = grid * np.array(size)
+    return np.array([np.sqrt(np.mean(np.sum((carry(h, points) - points) ** 2, 1))) for h in maps])
+
+
+def _similar(a: Floats, b: Floats, exact: float) -> tuple[Floats | None, Bools]:
+    """The shift, turn and scale that most corners share, and which do."""
+    # Corners for a map of four numbers.
+    if len(a) >= 8:
+        found, obey = cv2.estimateAffinePartial2D(a, b, ransacReprojThreshold=exact)
+        if found is not None:
+            return np.vstack([found, [0, 0, 1]]), obey[:, 0] > 0
+    return None, np.zeros(len(a), bool)
+
+
+def _by_corners(
+    before: _Relief, points: Floats, after: _Relief, last: Floats
+) -> tuple[Aligned | None, bool]:
+    """Where a frame lies in another, by its corners, from a map that is about right.
+
+    And whether they need no other witness: they are many, and tell the map exactly.
+    """
+    guess = carry(last, points) if len(points) else points
+    ends, found = _follow(before.fine, after.fine, points, guess)
+    a, b = points[found], ends[found]
+    best, good = _similar(a, b, 2 * _EXACT)
+    if best is None or good.sum() < max(20, _AGREE * len(a)):  # fewer are not worth a look
+        return None, False
+    if good.sum() >= _MANY:
+        full, obey = cv2.findHomography(a, b, cv2.RANSAC, _EXACT)
+        if full is not None and obey.sum() >= max(_MANY, 0.8 * good.sum()):
+            best, good = np.asarray(full, float), obey[:, 0] > 0
+    miss = np.linalg.norm(carry(best, a[good]) - b[good], axis=1)
+    error = float(np.sqrt(np.mean(miss**2) * 4 / len(miss)))
+    # Reduced pixels: corners that tell a map no better need another witness, too.
+    return Aligned(best, error), len(miss) >= _MANY and error < 0.05
+
+
+class _Key(NamedTuple):
+    """A frame in which others are located, its corners, and where it lies in the first one."""
+
+    relief: _Relief
+    points: Floats
+    grounds: list[Ground]
+    base: Floats
+    error: float
+
+    @classmethod
+    def of(cls, relief: _Relief, base: Floats, error: float) -> _Key:
+        return cls(relief, _corners(relief.fine), grounds(relief.levels), base, error)
+
+    def locate(self, relief: _Relief, last: Floats) -> Aligned | None:
+        """Where it lies in another, from a map that is about right.
+
+        By corners; if these are few, perhaps by pixels.
+        """
+        told, alone = _by_corners(self.relief, self.points, relief, last)
+        if alone:
+            return told
+        direct = align(self.grounds, relief.levels, last)
+        both = [one for one in (told, direct) if one is not None and one.error < _VAGUE]
+        best = min((one.error for one in both), default=0.0)
+        # Times the error of another map that is about as good; then the smaller step is taken.
+        good = [one for one in both if one.error <= 3.0 * best]
+        size, back = self.relief.fine.shape[::-1], np.linalg.inv(last)
+        steps = [displacement((one.map @ back)[None], size)[0] for one in good]
+        return good[int(np.argmin(steps))] if good else None
+
+    def shared(self, here: Floats) -> float:
+        """Share of it that is in the view of the frame in which it lies here."""
+        size = np.array(self.relief.fine.shape[::-1])
+        u, v = np.meshgrid(*np.outer(size, np.linspace(0, 1, 9)))
+        places = carry(here, np.column_stack([u.ravel(), v.ravel()]))
+        return float(((places >= 0) & (places < size)).all(axis=1).mean())
+
+
+def steadied(frames: Iterable[Image], factor: int) -> CameraMotion:
+    """The motion of a camera, by frames reduced by a factor, one after the other."""
+    maps: list[Floats] = []
+    errors: list[float] = []
+    for relief in map(_Relief.of, frames):
+        if not maps:
+            before = relief, np.eye(3), 0.0
+            key, last = _Key.of(*before), np.eye(3)
+            maps, errors = [np.eye(3)], [0.0]
+            continue
+        located = key.locate(relief, last)
+        if located is None:  # little in common with the key frame: more with the last one known
+            key, last = _Key.of(*before), np.eye(3)
+            located = key.locate(relief, last)
+        if located is None:
+            maps.append(maps[-1])
+            errors.append(np.inf)
+            continue
+        last = located.map
+        before = relief, key.base @ np.linalg.inv(last), float(np.hypot(key.error, located.error))
+        maps.append(before[1])
+        errors.append(before[2])
+        # Share of a key frame that is left, below which there must be a new one. Each adds its
+        # error to all that follow, so late: a little above the 0.3 that `align` needs.
+        if key.shared(last) < 0.4:
+            key, last = _Key.of(*before), np.eye(3)
+    return CameraMotion.of(np.array(maps), np.array(errors), factor)
+
 
 LOOSE = 1.0  # pixels (reduced ones if it is to be used at all) to which a camera's motion is known
 

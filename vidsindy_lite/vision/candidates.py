@@ -32,9 +32,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import changes, lengths, light, shadowed
-from .plate import Plate, least_difference, tolerance
-from .steadying import carry
+from .background import (
+    Plate,
+    carry,
+    changes,
+    least_difference,
+    lengths,
+    light,
+    shadowed,
+    tolerance,
+)
 from .video import Reel
 
 _KEPT = 16  # candidates of a frame

@@ -1,7 +1,7 @@
 """Detectors: where the target is in a single frame, whatever the other frames show.
 
 The paper tracks with YOLO-v8. Its vendor's code and weights cannot be part of this package, so here
-is a small network of the same family, written and trained from scratch (see `network`, `training`).
+is a small network of the same family, written and trained from scratch (see `network`).
 And any YOLO-v8 model that a user has exported to ONNX runs behind the same method, through OpenCV.
 
 Both turn an image into *predictions* of shape (5, n), one column per anchor: centre (u, v), width

@@ -21,8 +21,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import dot, hull, lengths, relit, shadowed
-from .plate import Plate, least_difference, tolerance
+from .background import Plate, dot, hull, least_difference, lengths, relit, shadowed, tolerance
 
 _CELLS = 32  # into which the side of a target is cut
 _REACH = 1.5  # sides of the target from its middle that its usual outline may have

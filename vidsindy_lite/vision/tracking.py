@@ -38,9 +38,9 @@ from .background import (
 from .candidates import Candidates, best_path, plainest_paths
 from .candidates import Path as Motion
 from .detector import Detection, LearnedDetector, OnnxDetector, detections
-from .hints import Hint
 from .moving import (
     Film,
+    Hint,
     Track,
     Ways,
     expected,
