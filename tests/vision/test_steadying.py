@@ -6,14 +6,8 @@ import pytest
 from footage import Phone, write_phone
 
 from vidsindy_lite import track
-from vidsindy_lite.vision.camera import (
-    CameraMotion,
-    carry,
-    grounds,
-    pyramid,
-    stands_still,
-    steadied,
-)
+from vidsindy_lite.vision.background import carry
+from vidsindy_lite.vision.camera import CameraMotion, Look, stands_still, steadied
 from vidsindy_lite.vision.camera import align as align_on
 
 SIZE = 960, 720
@@ -84,9 +78,9 @@ def test_reduced_maps_and_their_errors_become_those_of_whole_pixels():
 CLOUDY = 320, 240
 
 
-def align(before, after, guess):
-    """One pyramid laid on another."""
-    return align_on(grounds(before), after, guess)
+def align(before, after):
+    """The map of one view to another, about which nothing is known."""
+    return align_on(Look(before).grounds, Look(after).levels, np.eye(3))
 
 
 def sight(seed, here=None, noise=2.0, contrast=20, light=1.0):
@@ -123,8 +117,7 @@ def about_the_middle(**change):
     ],
 )
 def test_shift_turn_and_scale_of_clouds(move, light):
-    before, after = pyramid(sight(0)), pyramid(sight(0, move, light=light))
-    found = align(before, after, np.eye(3))
+    found = align(sight(0), sight(0, move, light=light))
     points = np.array([[40, 40, 1], [280, 40, 1], [160, 120, 1], [280, 200, 1.0]])
     miss = np.linalg.norm((points @ (found.map - move).T)[:, :2], axis=1)
     assert miss.max() < 0.1
@@ -136,7 +129,7 @@ def test_what_moves_on_its_own_is_left_aside():
     views = [sight(1), sight(1, move)]
     for view, left in zip(views, (60, 110), strict=True):
         view[60:180, left : left + 60] = (20, 20, 160)  # a large thing that goes elsewhere
-    found = align(*map(pyramid, views), np.eye(3))
+    found = align(*views)
     assert np.linalg.norm(found.map[:2, 2] - move[:2, 2]) < 0.5
 
 
@@ -149,7 +142,7 @@ def test_noise_and_a_few_things_tell_nothing(things):
         for u, v in rng.integers(20, 200, (things, 2)):
             wall[v : v + 12, u : u + 12] = 40
         views.append(np.clip(wall + rng.normal(0, 3, wall.shape), 0, 255).astype(np.uint8))
-    assert align(*map(pyramid, views), np.eye(3)).error > 2
+    assert align(*views).error > 2
     assert things or stands_still(views) is None
 
 
@@ -174,7 +167,7 @@ def test_the_error_of_a_map_is_about_that_by_which_it_misses():
     errors, misses = [], []
     for seed in range(6):
         move = similar(1.3, -0.8, 0.004)
-        found = align(pyramid(sight(seed, noise=4)), pyramid(sight(seed, move, noise=4)), np.eye(3))
+        found = align(sight(seed, noise=4), sight(seed, move, noise=4))
         points = np.array([[u, v, 1.0] for u in (20, 160, 300) for v in (20, 120, 220)])
         errors.append(found.error)
         misses.append(np.mean(((points @ (found.map - move).T) ** 2).sum(axis=1)) / 2)

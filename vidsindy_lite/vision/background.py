@@ -529,42 +529,34 @@ class Plate:
         hidden: Iterable[Floats] | None = None,
         lights: Floats32 | None = None,
     ) -> None:
-        size = np.array(samples.shape[2:0:-1])
-        self.size = size
+        self.size = np.array(samples.shape[2:0:-1])
         self.moves = not np.allclose(maps, np.eye(3))
-        self.shift = np.eye(3)
-        if lights is None:
-            lights = np.ones((len(samples), 3), np.float32)
-        if not self.moves and hidden is None and (lights == 1).all():
-            self.image = median_image(samples)
-            self.valid = np.full(self.image.shape[:2], 255, np.uint8)
-            return
-        width, height = size.tolist()
-        if self.moves:
-            corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * (size - 1.0)
-            ends = [carry(h, corners) for h in maps[known]]
-            low = np.floor(np.percentile([e.min(axis=0) for e in ends], 5, axis=0))
-            high = np.ceil(np.percentile([e.max(axis=0) for e in ends], 95, axis=0))
-            middle = carry(maps[known][len(maps[known]) // 2], corners).mean(axis=0)
-            # Frames that the plate may hold, side by side.
-            reach = size * np.sqrt(2.5) / 2
-            low = np.floor(np.maximum(low, middle - 1.5 * reach))
-            high = np.minimum(high, middle + 1.5 * reach)
-            self.shift = np.array([[1, 0, -low[0]], [0, 1, -low[1]], [0, 0, 1.0]])
-            width, height = (int(x) for x in np.ceil(high - low) + 1)
+        corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * (self.size - 1.0)
+        ends = [carry(h, corners) for h in maps[known]]
+        low = np.floor(np.percentile([e.min(axis=0) for e in ends], 5, axis=0))
+        high = np.ceil(np.percentile([e.max(axis=0) for e in ends], 95, axis=0))
+        middle = carry(maps[known][len(maps[known]) // 2], corners).mean(axis=0)
+        # Frames that the plate may hold, side by side.
+        reach = self.size * np.sqrt(2.5) / 2
+        low = np.floor(np.maximum(low, middle - 1.5 * reach))
+        high = np.minimum(high, middle + 1.5 * reach)
+        self.shift = np.array([[1, 0, -low[0]], [0, 1, -low[1]], [0, 0, 1.0]])
+        width, height = (int(x) for x in np.ceil(high - low) + 1)
         shows = [np.full(samples.shape[1:3], 255, np.uint8)] * len(samples)
         if hidden is not None:
             shows = [_without(one, box) for one, box in zip(shows, hidden, strict=True)]
         use = np.flatnonzero(known)
         moves = [self.shift @ maps[i] for i in use]
-        shown = [samples[i] for i in use]  # views: copies would fill the memory
+        shows = [shows[i] for i in use]
+        lights = np.ones((len(samples), 3), np.float32) if lights is None else lights
+        # The samples are views: copies would fill the memory.
         self.image, count = _masked_median(
-            shown, [shows[i] for i in use], moves, np.reciprocal(lights[use]), (width, height)
+            [samples[i] for i in use], shows, moves, np.reciprocal(lights[use]), (width, height)
         )
         # Samples that must show a place of the plate.
-        self.valid = np.where(count >= 3, 255, 0).astype(np.uint8)
+        self.valid = np.where(count >= min(3, len(use)), 255, 0).astype(np.uint8)
         if hidden is not None:
-            self._continue([shows[i] for i in use], moves, count)
+            self._continue(shows, moves, count)
 
     def _continue(self, shows: Sequence[Image], moves: Sequence[Floats], count: Image) -> None:
         """Ground that the target hides is what is seen of it, or what is around it."""
@@ -584,8 +576,6 @@ class Plate:
 
     def laid(self, image: Floats32, here: Floats) -> Floats32:
         """An image over the plate, as the frame that the map carries sees it; 1000 beyond it."""
-        if not self.moves:
-            return image
         back, size = np.linalg.inv(self.shift @ here), self.size.tolist()
         return np.asarray(cv2.warpPerspective(image, back, size, borderValue=1e3), np.float32)
 
@@ -598,9 +588,6 @@ class Plate:
         """
         left, top = np.zeros(2, int) if low is None else low
         size = (self.size if high is None else high) - [left, top]
-        if not self.moves:
-            window = np.s_[top : top + size[1] : step, left : left + size[0] : step]
-            return self.image[window], self.valid[window] > 0
         to_window = np.array([[1, 0, -left], [0, 1, -top], [0, 0, step]]) / step
         size = (-(-size // step)).tolist()
         back = to_window @ np.linalg.inv(self.shift @ here)

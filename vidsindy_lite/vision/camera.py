@@ -31,6 +31,8 @@ though.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import cv2
@@ -81,19 +83,63 @@ class Aligned(NamedTuple):
     error: float
 
 
-def pyramid(small: Image) -> list[Floats32]:
-    """Grey levels of an image at a half, a quarter, ... of its size."""
-    levels = [cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32)]
-    # Of the pyramid, the first of half the size.
-    while len(levels) <= 4 and min(levels[-1].shape) >= 32:
-        levels.append(np.asarray(cv2.pyrDown(levels[-1]), np.float32))
-    # So soft that linear interpolation neither shifts nor softens them (OpenCV's cubic one shifts).
-    return [np.asarray(cv2.GaussianBlur(level, (0, 0), 1), np.float32) for level in levels[1:]]
+class Look:
+    """A reduced frame as it is compared with others; what of it is not needed is not worked out."""
 
+    def __init__(self, small: Image) -> None:
+        self.grey = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32)
 
-def grounds(levels: list[Floats32]) -> list[Ground]:
-    """Of a `pyramid`."""
-    return [Ground.of(grey) for grey in levels]
+    @cached_property
+    def levels(self) -> list[Floats32]:
+        """Its grey levels at a half, a quarter, ... of its size."""
+        levels = [self.grey]
+        while len(levels) <= 4 and min(levels[-1].shape) >= 32:
+            levels.append(np.asarray(cv2.pyrDown(levels[-1]), np.float32))
+        # So soft that linear interpolation neither shifts nor softens them (the cubic one shifts).
+        return [np.asarray(cv2.GaussianBlur(one, (0, 0), 1), np.float32) for one in levels[1:]]
+
+    @cached_property
+    def grounds(self) -> list[Ground]:
+        """These, as others are laid on them."""
+        return [Ground.of(grey) for grey in self.levels]
+
+    @cached_property
+    def relief(self) -> Image:
+        """What stands out from its surroundings, whatever the light."""
+        grey = np.asarray(cv2.GaussianBlur(self.grey, (0, 0), 1))
+        mean = cv2.blur(cv2.blur(grey, (_WIDTH, _WIDTH)), (_WIDTH, _WIDTH))
+        relief = 128 + 250 * (grey - mean) / (mean + 20)  # below 20, all is dark
+        return np.clip(relief, 0, 255).astype(np.uint8)
+
+    @cached_property
+    def corners(self) -> Floats:
+        """The best corner of each part of the image that has one, (m, 2): none counts twice."""
+        sharp = np.asarray(cv2.cornerMinEigenVal(self.relief, 9, ksize=3))
+        height, width = (side // PARTS for side in sharp.shape)
+        if not height or not width:
+            return np.zeros((0, 2))
+        whole = sharp[: height * PARTS, : width * PARTS].reshape(PARTS, height, PARTS, width)
+        parts = whole.swapaxes(1, 2).reshape(PARTS**2, -1)
+        best = parts.argmax(axis=1)
+        row, column = np.divmod(np.arange(PARTS**2), PARTS)
+        found = np.column_stack([column * width + best % width, row * height + best // width])
+        # Smallest eigenvalue of the gradient's covariance in a corner, grey levels squared.
+        return found[parts.max(axis=1) > 2.0 / 255**2].astype(float)
+
+    def follow(self, other: Look, guess: Floats) -> tuple[Floats, Floats]:
+        """Where its corners are, and where they are found in another image, near a guess (3, 3)."""
+        if not len(self.corners):
+            return self.corners, self.corners
+        points = self.corners.astype(np.float32)[:, None]
+        near = carry(guess, self.corners).astype(np.float32)[:, None].copy()
+        flown, found, _ = cv2.calcOpticalFlowPyrLK(
+            self.relief, other.relief, points, near, winSize=(15, 15), maxLevel=3,
+            flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+        )  # fmt: skip
+        ends = np.asarray(flown[:, 0], float)
+        within = ((ends >= 0) & (ends < other.relief.shape[::-1])).all(axis=1)
+        good = (np.asarray(found)[:, 0] > 0) & within
+        return self.corners[good], ends[good]
 
 
 def align(before: list[Ground], after: list[Floats32], guess: Floats) -> Aligned | None:
@@ -164,10 +210,10 @@ def _fit(
             return None
         miss = shown - gain * key - offset
         if step == 0:
-            offset = _middle(miss[known])
+            offset = np.median(miss[known][::2])
             miss -= offset
         # Grey levels; a deviation without any noise.
-        spread = max(1.4826 * _middle(np.abs(miss[known])), 0.3)
+        spread = max(1.4826 * np.median(np.abs(miss[known])[::2]), 0.3)
         bound = max(3 * spread, loose / 2**step)
         weight = share * known / (1 + (miss / bound) ** 2) ** 2
         heavy = steep * weight.ravel()
@@ -195,14 +241,6 @@ def _fit(
     if telling.mean() <= np.sqrt(0.1 * (telling**2).mean()):
         return Aligned(here, np.inf)
     return Aligned(here, _error(slopes, weight * miss / spread**2, information))
-
-
-def _middle(values: Floats | Floats32) -> float:
-    """The median of every other value, in a fifth of numpy's time."""
-    half = values[::2]
-    k = len(half) // 2
-    parts = np.partition(half, k)
-    return float(parts[k] if len(half) % 2 else (parts[:k].max() + parts[k]) / 2)
 
 
 def _by_blocks(values: Floats32) -> Floats32:
@@ -271,71 +309,24 @@ def rescaled(maps: Floats, factor: float) -> Floats:
     return np.asarray(np.linalg.inv(larger) @ maps @ larger, float)
 
 
-class _Relief(NamedTuple):
-    """A reduced frame: what stands out from its surroundings, whatever the light; grey levels."""
-
-    fine: Image
-    levels: list[Floats32]
-
-    @classmethod
-    def of(cls, small: Image) -> _Relief:
-        grey = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32)
-        grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), 1))
-        mean = cv2.blur(cv2.blur(grey, (_WIDTH, _WIDTH)), (_WIDTH, _WIDTH))
-        fine = np.clip(128 + 250 * (grey - mean) / (mean + 20), 0, 255)  # below 20, all is dark
-        return cls(fine.astype(np.uint8), pyramid(small))
-
-
-def _corners(grey: Image) -> Floats:
-    """The best corner of each part of the image that has one, (m, 2): none counts twice."""
-    sharp = cv2.cornerMinEigenVal(grey, 9, ksize=3)
-    height, width = (side // PARTS for side in grey.shape)
-    if not height or not width:
-        return np.zeros((0, 2))
-    whole = np.asarray(sharp)[: height * PARTS, : width * PARTS]
-    parts = whole.reshape(PARTS, height, PARTS, width).swapaxes(1, 2).reshape(PARTS**2, -1)
-    best = parts.argmax(axis=1)
-    row, column = np.divmod(np.arange(PARTS**2), PARTS)
-    found = np.column_stack([column * width + best % width, row * height + best // width])
-    # Smallest eigenvalue of the gradient's covariance in a corner, grey levels squared.
-    return found[parts.max(axis=1) > 2.0 / 255**2].astype(float)
-
-
-def _follow(before: Image, after: Image, points: Floats, guess: Floats) -> tuple[Floats, Bools]:
-    """Where the corners are in another image, and which were found."""
-    if not len(points):
-        return points, np.zeros(0, bool)
-    flown, found, _ = cv2.calcOpticalFlowPyrLK(
-        before, after, points.astype(np.float32)[:, None], guess.astype(np.float32)[:, None].copy(),
-        winSize=(15, 15), maxLevel=3, flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
-    )  # fmt: skip
-    ends = np.asarray(flown[:, 0], float)
-    size = np.array(after.shape[1::-1])
-    within = ((ends >= 0) & (ends < size)).all(axis=1)
-    return ends, (np.asarray(found)[:, 0] > 0) & within
-
-
 def stands_still(samples: Iterable[Image]) -> bool | None:
     """Does no pair of reduced samples, successive or far apart, show that the camera moves?
 
     It moves if clearly more corners share a motion than stay where they are. None if most pairs
     are too plain to tell.
     """
-    reliefs = [_Relief.of(sample) for sample in samples]
-    pairs = list(zip(reliefs, reliefs[1:], strict=False))
-    middle = reliefs[len(reliefs) // 2]
+    looks = [Look(sample) for sample in samples]
+    middle = looks[len(looks) // 2]
     found = []
-    for before, after in [(reliefs[0], middle), (middle, reliefs[-1]), *pairs]:
+    for before, after in [(looks[0], middle), (middle, looks[-1]), *pairwise(looks)]:
         found.append(_moved(before, after))
         if found[-1]:
             return False
     return True if 2 * found.count(None) < len(found) else None
 
 
-def _moved(before: _Relief, after: _Relief) -> bool | None:
-    points = _corners(before.fine)
-    ends, found = _follow(before.fine, after.fine, points, points)
-    a, b = points[found], ends[found]
+def _moved(before: Look, after: Look) -> bool | None:
+    a, b = before.follow(after, np.eye(3))
     similar, _ = _similar(a, b, 2 * _STILL)
     if similar is None:
         return _drifted(before, after)
@@ -344,7 +335,7 @@ def _moved(before: _Relief, after: _Relief) -> bool | None:
     moves = bool(still.sum() < 0.7 * share.sum())
     # Corners that must share a motion, if it is to be the camera's.
     few = share.sum() < max(10, moves * _AGREE * len(a))
-    if few or (moves and not _widespread(a[share], before.fine.shape)):
+    if few or (moves and not _widespread(a[share], before.grey.shape)):
         return _drifted(before, after)
     return moves
 
@@ -356,12 +347,12 @@ def _widespread(points: Floats, shape: Sequence[int]) -> bool:
     return bool(np.sqrt(points.var(axis=0).sum()) > 0.6 * image)
 
 
-def _drifted(before: _Relief, after: _Relief) -> bool | None:
+def _drifted(before: Look, after: Look) -> bool | None:
     """Do all pixels tell of a motion, where corners are few? None if these are mute, too."""
-    found = align(grounds(before.levels), after.levels, np.eye(3))
+    found = align(before.grounds, after.levels, np.eye(3))
     if found is None or found.error > _VAGUE:
         return None
-    moved = displacement(found.map[None], before.fine.shape[::-1])[0]
+    moved = displacement(found.map[None], before.grey.shape[::-1])[0]
     return bool(moved > PLAINLY / 2 * found.error)
 
 
@@ -382,16 +373,12 @@ def _similar(a: Floats, b: Floats, exact: float) -> tuple[Floats | None, Bools]:
     return None, np.zeros(len(a), bool)
 
 
-def _by_corners(
-    before: _Relief, points: Floats, after: _Relief, last: Floats
-) -> tuple[Aligned | None, bool]:
+def _by_corners(before: Look, after: Look, last: Floats) -> tuple[Aligned | None, bool]:
     """Where a frame lies in another, by its corners, from a map that is about right.
 
     And whether they need no other witness: they are many, and tell the map exactly.
     """
-    guess = carry(last, points) if len(points) else points
-    ends, found = _follow(before.fine, after.fine, points, guess)
-    a, b = points[found], ends[found]
+    a, b = before.follow(after, last)
     best, good = _similar(a, b, 2 * _EXACT)
     if best is None or good.sum() < max(20, _AGREE * len(a)):  # fewer are not worth a look
         return None, False
@@ -406,38 +393,32 @@ def _by_corners(
 
 
 class _Key(NamedTuple):
-    """A frame in which others are located, its corners, and where it lies in the first one."""
+    """A frame in which others are located, and where it lies in the first one."""
 
-    relief: _Relief
-    points: Floats
-    grounds: list[Ground]
+    look: Look
     base: Floats
     error: float
 
-    @classmethod
-    def of(cls, relief: _Relief, base: Floats, error: float) -> _Key:
-        return cls(relief, _corners(relief.fine), grounds(relief.levels), base, error)
-
-    def locate(self, relief: _Relief, last: Floats) -> Aligned | None:
+    def locate(self, look: Look, last: Floats) -> Aligned | None:
         """Where it lies in another, from a map that is about right.
 
         By corners; if these are few, perhaps by pixels.
         """
-        told, alone = _by_corners(self.relief, self.points, relief, last)
+        told, alone = _by_corners(self.look, look, last)
         if alone:
             return told
-        direct = align(self.grounds, relief.levels, last)
+        direct = align(self.look.grounds, look.levels, last)
         both = [one for one in (told, direct) if one is not None and one.error < _VAGUE]
         best = min((one.error for one in both), default=0.0)
         # Times the error of another map that is about as good; then the smaller step is taken.
         good = [one for one in both if one.error <= 3.0 * best]
-        size, back = self.relief.fine.shape[::-1], np.linalg.inv(last)
+        size, back = self.look.grey.shape[::-1], np.linalg.inv(last)
         steps = [displacement((one.map @ back)[None], size)[0] for one in good]
         return good[int(np.argmin(steps))] if good else None
 
     def shared(self, here: Floats) -> float:
         """Share of it that is in the view of the frame in which it lies here."""
-        size = np.array(self.relief.fine.shape[::-1])
+        size = np.array(self.look.grey.shape[::-1])
         u, v = np.meshgrid(*np.outer(size, np.linspace(0, 1, 9)))
         places = carry(here, np.column_stack([u.ravel(), v.ravel()]))
         return float(((places >= 0) & (places < size)).all(axis=1).mean())
@@ -447,28 +428,28 @@ def steadied(frames: Iterable[Image], factor: int) -> CameraMotion:
     """The motion of a camera, by frames reduced by a factor, one after the other."""
     maps: list[Floats] = []
     errors: list[float] = []
-    for relief in map(_Relief.of, frames):
+    located: Aligned | None
+    for look in map(Look, frames):
         if not maps:
-            before = relief, np.eye(3), 0.0
-            key, last = _Key.of(*before), np.eye(3)
-            maps, errors = [np.eye(3)], [0.0]
-            continue
-        located = key.locate(relief, last)
-        if located is None:  # little in common with the key frame: more with the last one known
-            key, last = _Key.of(*before), np.eye(3)
-            located = key.locate(relief, last)
+            key = before = _Key(look, np.eye(3), 0.0)
+            last, located = np.eye(3), Aligned(np.eye(3), 0.0)
+        elif (located := key.locate(look, last)) is None:
+            # Little in common with the key frame: more with the last one known.
+            key, last = before, np.eye(3)
+            located = key.locate(look, last)
         if located is None:
             maps.append(maps[-1])
             errors.append(np.inf)
             continue
         last = located.map
-        before = relief, key.base @ np.linalg.inv(last), float(np.hypot(key.error, located.error))
-        maps.append(before[1])
-        errors.append(before[2])
+        error = float(np.hypot(key.error, located.error))
+        before = _Key(look, key.base @ np.linalg.inv(last), error)
+        maps.append(before.base)
+        errors.append(error)
         # Share of a key frame that is left, below which there must be a new one. Each adds its
         # error to all that follow, so late: a little above the 0.3 that `align` needs.
         if key.shared(last) < 0.4:
-            key, last = _Key.of(*before), np.eye(3)
+            key, last = before, np.eye(3)
     return CameraMotion.of(np.array(maps), np.array(errors), factor)
 
 
@@ -503,15 +484,14 @@ def rests(samples: Image) -> bool:
     Not so if it moves, nor if there is too little to see.
     """
     rest = np.broadcast_to(np.eye(3), (len(samples), 3, 3))
-    plate = Plate(samples, rest, np.ones(len(samples), bool)).image
-    sides = [np.array([[1, 0, u], [0, 1, v]], float) for u, v in ((1, 0), (-1, 0), (0, 1), (0, -1))]
-    size, everywhere = plate.shape[1::-1], np.ones(plate.shape[:2], bool)
-    beside = [cv2.warpAffine(plate, side, size, borderMode=cv2.BORDER_REPLICATE) for side in sides]
+    plate = Plate(samples, rest, np.ones(len(samples), bool))
     least = []
     for sample in samples:
-        here = _misses(sample, plate, everywhere)
-        off = [_misses(sample, np.asarray(one, np.uint8), everywhere) for one in beside]
-        least.append(min(_gain(here, there) for there in off))
+        here, *beside = (
+            _misses(sample, *plate.seen_from(np.array([[1, 0, u], [0, 1, v], [0, 0, 1.0]])))
+            for u, v in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
+        )
+        least.append(min(_gain(here, there) for there in beside))
     # Share of the frames that say so, if the camera is at rest.
     return bool(np.mean(np.array(least) > 0) >= 0.9)
 
@@ -548,7 +528,7 @@ def _gain(one: Floats32, other: Floats32) -> float:
 
 def trembling(frames: Reel, samples: Image) -> CameraMotion | None:
     """The motion of a camera that trembles, None if that is not sure; `samples` are reduced."""
-    views = [pyramid(sample) for sample in samples]
+    views = [Look(sample).levels for sample in samples]
     maps = np.tile(np.eye(3), (len(samples), 1, 1))
     # Each of the samples as they were laid on the one before.
     for _ in range(2):
@@ -557,7 +537,7 @@ def trembling(frames: Reel, samples: Image) -> CameraMotion | None:
         # Reduced pixels to which a motion must be known.
         if np.median([one.error for one in laid]) > 0.5:
             return None
-        maps = _maps(laid)
+        maps[:] = np.linalg.inv([one.map for one in laid])
         # Reduced pixels: what moves farther blurs the first plate too much.
         if displacement(maps, samples.shape[2:0:-1]).max() > 8.0:
             return None
@@ -572,7 +552,7 @@ def trembling(frames: Reel, samples: Image) -> CameraMotion | None:
 def _ground(plate: Plate) -> list[Ground]:
     """A plate as the first frame shows it, to lay others on."""
     image, known = plate.seen_from(np.eye(3))
-    return [_limited(level, known) for level in grounds(pyramid(image))]
+    return [_limited(level, known) for level in Look(image).grounds]
 
 
 def _limited(level: Ground, where: Bools) -> Ground:
@@ -587,11 +567,6 @@ def _laid(ground: list[Ground], view: list[Floats32], here: Floats) -> Aligned:
     """The map of the ground to a view, from one the other way round that is about right."""
     back = np.asarray(np.linalg.inv(here), float)
     return align(ground, view, back) or Aligned(back, np.inf)
-
-
-def _maps(laid: Sequence[Aligned]) -> Floats:
-    """Where views lie on the ground, (n, 3, 3)."""
-    return np.asarray(np.linalg.inv([one.map for one in laid]), float)
 
 
 def _halves(
@@ -619,8 +594,8 @@ def _halves(
 
 def _motion(ground: list[Ground], frames: Reel, larger: float) -> CameraMotion:
     """All frames laid on the ground, and so on the first; errors are `larger` than they tell."""
-    laid = [_laid(ground, pyramid(frame), np.eye(3)) for frame in frames]
-    maps, errors = _maps(laid), np.array([one.error for one in laid])
+    laid = [_laid(ground, Look(frame).levels, np.eye(3)) for frame in frames]
+    maps, errors = np.linalg.inv([one.map for one in laid]), np.array([one.error for one in laid])
     sure = larger * np.hypot(errors, errors[0])
     sure[0] = 0.0
     return CameraMotion.of(np.linalg.inv(maps[0]) @ maps, sure, frames.factor)
