@@ -16,11 +16,12 @@
 """
 
 from .detector import WEIGHTS, LearnedDetector, detections
-from .moving import Hint, Track, load_hints
+from .candidates import Hint, load_hints
+from .moving import Track, track_targets
 from .rendering import BACKGROUNDS, SHAPES, Scene, render, render_labelled, render_restless
 from .rendering import render_video
 from .track_files import TrackFile, read_tracks
-from .tracking import check_detector, track, track_targets
+from .tracking import check_detector, track
 from .video import (
     VideoInfo,
     frame_clock,

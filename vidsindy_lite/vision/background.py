@@ -39,14 +39,12 @@ from .video import Reel, reduce
 LONGEST = 480  # pixels of the longer side of a reduced frame
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
 STRIP = 64  # rows of an image that are sorted at once: what they need stays in the cache
-_RING = 2  # pixels on both sides of the target's outline whose coverage is estimated
-_BORDER = 3  # coarse pixels around a place that show how its surroundings continue
 _OFTEN = 0.1  # share of the samples in which other things differ: more are unrest
-_NEAR = 16  # coarse pixels, within which several things that differ may be one target
 _SHAKY = 0.15  # pixels of displacement above which a camera is not at rest
 _TOO_LARGE = 0.25  # share of the image that no target fills
 
-_DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RING + 1, 2 * _RING + 1))
+# Two pixels on both sides of the target's outline, whose coverage is estimated.
+_DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
 
 Window = tuple[slice, slice]
 _Look = tuple[Floats, float, float]
@@ -139,6 +137,14 @@ def median_image(frames: Image) -> Image:
     return result
 
 
+def _around(box: Sequence[int] | NDArray[np.int32], margin: int) -> Window:
+    """The window of an image from so far before a box (left, top, width, height) to behind it."""
+    left, top, width, height = box[:4]
+    return np.s_[
+        max(top - margin, 0) : top + height + margin, max(left - margin, 0) : left + width + margin
+    ]
+
+
 def _remove_ghosts(background: Image, samples: Image, coarse: Image, floor: float) -> None:
     """Correct in place a background that contains the target where it stayed for long.
 
@@ -157,20 +163,17 @@ def _remove_ghosts(background: Image, samples: Image, coarse: Image, floor: floa
         group = differs[:, labels == k].mean(axis=1) > 0.5
         if group.all() or not group.any():
             continue
-        left, top, width, height = stats[k, :4]
-        right, bottom = left + width + _BORDER, top + height + _BORDER
-        left, top = max(left - _BORDER, 0), max(top - _BORDER, 0)
-        window = np.s_[top:bottom, left:right]
+        window = _around(stats[k], 3)  # coarse pixels that show how its surroundings continue
         place = np.asarray(cv2.dilate((labels[window] == k).astype(np.uint8), np.ones((3, 3))))
         inside = place > 0
         around = cv2.inpaint(reduced[window], place, 3, cv2.INPAINT_TELEA)
         looks = [np.median(coarse[:, *window][g], axis=0)[inside] for g in (group, ~group)]
         off = [np.abs(look - around[inside]).sum() for look in looks]
-        window = np.s_[_COARSE * top : _COARSE * bottom, _COARSE * left : _COARSE * right]
-        view = background[window]
+        whole = tuple(slice(_COARSE * side.start, _COARSE * side.stop) for side in window)
+        view = background[whole]
         mask = place.repeat(_COARSE, 0).repeat(_COARSE, 1)[: view.shape[0], : view.shape[1]] > 0
         better = group if off[0] < off[1] else ~group
-        view[mask] = median_image(samples[:, *window][better])[mask]
+        view[mask] = median_image(samples[:, *whole][better])[mask]
 
 
 def _others(changes: list[Floats32], floor: float) -> float:
@@ -185,15 +188,12 @@ def _others(changes: list[Floats32], floor: float) -> float:
         largest = _largest_component(differs)
         if largest is None:
             continue
-        left, top, width, height, area = largest[1]
-        near = np.s_[
-            max(top - _NEAR, 0) : top + height + _NEAR, max(left - _NEAR, 0) : left + width + _NEAR
-        ]
-        differs[near] = False
+        # Coarse pixels, within which several things that differ may be one target.
+        differs[_around(largest[1], 16)] = False
         other = _largest_component(differs)
         # Coarse pixels in one place that are more than noise.
         found.append(
-            area > _TOO_LARGE * differs.size
+            largest[1][cv2.CC_STAT_AREA] > _TOO_LARGE * differs.size
             or (other is not None and other[1][cv2.CC_STAT_AREA] >= 4)
         )
     return float(np.mean(found)) if found else 0.0
@@ -374,7 +374,7 @@ class BackgroundModel:
             return None
         corner, extent = found[1][:2], found[1][2:4]
         centre = _COARSE * (corner + (extent - 1) / 2) + (_COARSE - 1) / 2
-        return centre, _COARSE * (extent.max() / 2 + 1) + 2 * _RING
+        return centre, _COARSE * (extent.max() / 2 + 1) + 4
 
     def measure(self, frame: Image, centre: Floats, half: float) -> Blob | None:
         """The target within `half` pixels of `centre`, if it is there."""
@@ -412,7 +412,7 @@ class BackgroundModel:
 
 
 def _erode(label: Image) -> Image:
-    """A mask without its rim of `_RING` pixels."""
+    """A mask without its rim of two pixels."""
     eroded = cv2.erode(label, _DISC, borderType=cv2.BORDER_CONSTANT, borderValue=0)
     return np.asarray(eroded, np.uint8)
 
@@ -497,12 +497,24 @@ def view_distances(blobs: Sequence[Blob | None]) -> Floats:
     return found
 
 
-def whole_views(distance: Floats) -> Bools:
-    """Frames (n,) in which the whole target is seen, given their `view_distances`.
+def whole_blobs(model: BackgroundModel, frames: Iterable[Image]) -> tuple[Floats, Floats, bool]:
+    """Centroids of the whole target (n, 2), NaN where it is not seen, and how sure each view is.
 
-    A view beside a distant one may be cut a little: it must be twice as close.
+    And whether outlines are too blurred to tell whole views by: where these are blurred, by motion
+    or a codec, and many views are left out, it is by the blur that they differ.
     """
-    return ~ndimage.binary_propagation(distance > 1, mask=distance > 0.5)
+    blobs = list(track_blobs(model, frames))
+    distance = view_distances(blobs)
+    # A view beside a distant one may be cut a little: it must be twice as close.
+    whole = ~ndimage.binary_propagation(distance > 1, mask=distance > 0.5)
+    centroids = np.array([b.centroid if b else (np.nan, np.nan) for b in blobs], float)
+    centroids[~whole] = np.nan
+    inside = np.array([b is not None and b.inside for b in blobs])
+    soft = [b.softness for b in blobs if b is not None and b.inside]
+    # Of a sharp outline it is 0.6, see `Blob`.
+    # Share of views that are whole, below which a blurred outline cannot be trusted.
+    blurred = bool(inside.any() and np.median(soft) > 1.0 and whole[inside].mean() < 0.95)
+    return centroids, np.exp(-distance), blurred
 
 
 class Plate:
@@ -522,13 +534,9 @@ class Plate:
     """
 
     def __init__(
-        self,
-        samples: Image,
-        maps: Floats,
-        known: Bools,
-        hidden: Iterable[Floats] | None = None,
+        self, samples: Image, maps: Floats, known: Bools, hidden: Iterable[Floats] | None = None,
         lights: Floats32 | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.size = np.array(samples.shape[2:0:-1])
         self.moves = not np.allclose(maps, np.eye(3))
         corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * (self.size - 1.0)
@@ -567,9 +575,8 @@ class Plate:
             covered |= np.asarray(there, np.uint8)
         self.valid |= covered
         never = ((count == 0) & (covered > 0)).astype(np.uint8)
-        left, top, width, height = cv2.boundingRect(never)
-        if width:
-            window = np.s_[max(top - 8, 0) : top + height + 8, max(left - 8, 0) : left + width + 8]
+        if never.any():
+            window = _around(cv2.boundingRect(never), 8)
             self.image[window] = cv2.inpaint(
                 self.image[window], never[window], 3, cv2.INPAINT_TELEA
             )

@@ -42,12 +42,10 @@ from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .background import Plate, carry, changes, lengths, light
 from .video import Reel
 
-_RIM = 2  # pixels of each level that depend on what lies beyond the image
 _BEYOND = -1e6  # in place of grey levels where nothing is shown: what it has a part in is below 0
 _STEP = 8.0  # pixels by which the guess may be wrong
 PARTS = 12  # into which each side of an image is cut: of one corner, and of one error, each
-_WIDTH = 21  # reduced pixels: what is smoother than this is light
-_EXACT = 1.0  # reduced pixels by which a corner may miss its place
+LOOSE = 1.0  # pixels (reduced ones if it is to be used at all) to which a camera's motion is known
 _STILL = 0.25  # reduced pixels by which a corner at rest may seem to move
 _VAGUE = 3.0  # reduced pixels: a map that is known no better is not known
 PLAINLY = 10.0  # standard errors of a displacement that is one
@@ -107,7 +105,7 @@ class Look:
     def relief(self) -> Image:
         """What stands out from its surroundings, whatever the light."""
         grey = np.asarray(cv2.GaussianBlur(self.grey, (0, 0), 1))
-        mean = cv2.blur(cv2.blur(grey, (_WIDTH, _WIDTH)), (_WIDTH, _WIDTH))
+        mean = cv2.blur(cv2.blur(grey, (21, 21)), (21, 21))  # what is smoother than this is light
         relief = 128 + 250 * (grey - mean) / (mean + 20)  # below 20, all is dark
         return np.clip(relief, 0, 255).astype(np.uint8)
 
@@ -198,7 +196,7 @@ def _fit(
     prior = np.diag(1 / sure**2)
     gain, offset = 1.0, 0.0
     framed = np.full_like(view, _BEYOND)
-    inner = np.s_[_RIM:-_RIM, _RIM:-_RIM]
+    inner = np.s_[2:-2, 2:-2]  # the rim depends on what lies beyond the image
     framed[inner] = view[inner]
     within = framed >= 0
     for step in range(6):
@@ -335,16 +333,11 @@ def _moved(before: Look, after: Look) -> bool | None:
     moves = bool(still.sum() < 0.7 * share.sum())
     # Corners that must share a motion, if it is to be the camera's.
     few = share.sum() < max(10, moves * _AGREE * len(a))
-    if few or (moves and not _widespread(a[share], before.grey.shape)):
+    # Those of one large thing are not spread over the image, by its own spread.
+    apart = 0.6 * np.linalg.norm(before.grey.shape) / np.sqrt(12)
+    if few or (moves and np.sqrt(a[share].var(axis=0).sum()) <= apart):
         return _drifted(before, after)
     return moves
-
-
-def _widespread(points: Floats, shape: Sequence[int]) -> bool:
-    """Are points spread over an image (height, width)? Those of one large thing are not."""
-    image = np.linalg.norm(shape) / np.sqrt(12)
-    # Times the image's own spread, that of corners that tell the camera's motion at least.
-    return bool(np.sqrt(points.var(axis=0).sum()) > 0.6 * image)
 
 
 def _drifted(before: Look, after: Look) -> bool | None:
@@ -379,11 +372,11 @@ def _by_corners(before: Look, after: Look, last: Floats) -> tuple[Aligned | None
     And whether they need no other witness: they are many, and tell the map exactly.
     """
     a, b = before.follow(after, last)
-    best, good = _similar(a, b, 2 * _EXACT)
+    best, good = _similar(a, b, 2 * LOOSE)
     if best is None or good.sum() < max(20, _AGREE * len(a)):  # fewer are not worth a look
         return None, False
     if good.sum() >= _MANY:
-        full, obey = cv2.findHomography(a, b, cv2.RANSAC, _EXACT)
+        full, obey = cv2.findHomography(a, b, cv2.RANSAC, LOOSE)
         if full is not None and obey.sum() >= max(_MANY, 0.8 * good.sum()):
             best, good = np.asarray(full, float), obey[:, 0] > 0
     miss = np.linalg.norm(carry(best, a[good]) - b[good], axis=1)
@@ -453,9 +446,6 @@ def steadied(frames: Iterable[Image], factor: int) -> CameraMotion:
     return CameraMotion.of(np.array(maps), np.array(errors), factor)
 
 
-LOOSE = 1.0  # pixels (reduced ones if it is to be used at all) to which a camera's motion is known
-
-
 def explains(samples: Image, maps: Floats, known: Bools) -> bool:
     """Are reduced frames likelier with a camera that moves by these maps than with one at rest?
 
@@ -467,13 +457,8 @@ def explains(samples: Image, maps: Floats, known: Bools) -> bool:
     apart = np.array([displacement(np.linalg.inv(usual) @ maps, size) for usual in maps])
     weights = apart[apart.sum(axis=1).argmin()]
     all_known = np.ones(len(maps), bool)
-    plates = Plate(samples, maps, all_known), Plate(samples, rest, all_known)
-    gains = [
-        _gain(
-            *(_misses(sample, *plate.seen_from(at)) for plate, at in zip(plates, both, strict=True))
-        )
-        for sample, *both in zip(samples, maps, rest, strict=True)
-    ]
+    moved, rested = (_missed(samples, Plate(samples, at, all_known), at) for at in (maps, rest))
+    gains = [_gain(*both) for both in zip(moved, rested, strict=True)]
     # Of a gain: the noise of a median of 21 frames adds that, and maps smooth it.
     return bool(weights @ gains > 0.04 * weights.sum())
 
@@ -485,15 +470,20 @@ def rests(samples: Image) -> bool:
     """
     rest = np.broadcast_to(np.eye(3), (len(samples), 3, 3))
     plate = Plate(samples, rest, np.ones(len(samples), bool))
-    least = []
-    for sample in samples:
-        here, *beside = (
-            _misses(sample, *plate.seen_from(np.array([[1, 0, u], [0, 1, v], [0, 0, 1.0]])))
-            for u, v in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
-        )
-        least.append(min(_gain(here, there) for there in beside))
+    here, *beside = (
+        _missed(samples, plate, rest + np.array([[0, 0, u], [0, 0, v], [0, 0, 0]]))
+        for u, v in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
+    )
+    least = [
+        min(_gain(one, other) for other in off) for one, *off in zip(here, *beside, strict=True)
+    ]
     # Share of the frames that say so, if the camera is at rest.
     return bool(np.mean(np.array(least) > 0) >= 0.9)
+
+
+def _missed(samples: Image, plate: Plate, maps: Floats) -> list[Floats32]:
+    """What each sample misses of a plate that lies in it by these maps, see `_misses`."""
+    return [_misses(one, *plate.seen_from(at)) for one, at in zip(samples, maps, strict=True)]
 
 
 def _misses(frame: Image, ground: Image, known: Bools) -> Floats32:
@@ -532,7 +522,8 @@ def trembling(frames: Reel, samples: Image) -> CameraMotion | None:
     maps = np.tile(np.eye(3), (len(samples), 1, 1))
     # Each of the samples as they were laid on the one before.
     for _ in range(2):
-        ground = _ground(Plate(samples, maps, np.ones(len(samples), bool)))
+        image, known = Plate(samples, maps, np.ones(len(samples), bool)).seen_from(np.eye(3))
+        ground = [_limited(level, known) for level in Look(image).grounds]
         laid = [_laid(ground, view, here) for view, here in zip(views, maps, strict=True)]
         # Reduced pixels to which a motion must be known.
         if np.median([one.error for one in laid]) > 0.5:
@@ -546,13 +537,13 @@ def trembling(frames: Reel, samples: Image) -> CameraMotion | None:
     if alike < 0.5:
         return None
     usual = np.sqrt(np.mean([one.error**2 for one in laid if np.isfinite(one.error)]))
-    return _motion(ground, frames, max(error / usual, 1.0))
-
-
-def _ground(plate: Plate) -> list[Ground]:
-    """A plate as the first frame shows it, to lay others on."""
-    image, known = plate.seen_from(np.eye(3))
-    return [_limited(level, known) for level in Look(image).grounds]
+    # All frames laid on the ground, and so on the first; errors are larger than pixels tell.
+    laid = [_laid(ground, Look(frame).levels, np.eye(3)) for frame in frames]
+    places = np.asarray(np.linalg.inv([one.map for one in laid]), float)
+    errors = np.array([one.error for one in laid])
+    sure = max(error / usual, 1.0) * np.hypot(errors, errors[0])
+    sure[0] = 0.0
+    return CameraMotion.of(np.linalg.inv(places[0]) @ places, sure, frames.factor)
 
 
 def _limited(level: Ground, where: Bools) -> Ground:
@@ -592,15 +583,6 @@ def _halves(
     return float(alike), float(np.sqrt(np.mean((one - other) ** 2)) / 2)
 
 
-def _motion(ground: list[Ground], frames: Reel, larger: float) -> CameraMotion:
-    """All frames laid on the ground, and so on the first; errors are `larger` than they tell."""
-    laid = [_laid(ground, Look(frame).levels, np.eye(3)) for frame in frames]
-    maps, errors = np.linalg.inv([one.map for one in laid]), np.array([one.error for one in laid])
-    sure = larger * np.hypot(errors, errors[0])
-    sure[0] = 0.0
-    return CameraMotion.of(np.linalg.inv(maps[0]) @ maps, sure, frames.factor)
-
-
 def camera_motion(frames: Reel, small: Image, sampled: Ints) -> tuple[CameraMotion, bool]:
     """The camera's motion, and whether that is sure.
 
@@ -624,19 +606,11 @@ def _followed(frames: Reel, small: Image, sampled: Ints) -> CameraMotion | None:
     frames fit together worse by them than at rest.
     """
     motion = steadied(frames, frames.factor)
-    if not _plainly(motion, frames.info.size, frames.factor):
+    errors = motion.errors[1:]
+    sure = displacement(motion.maps[1:], frames.info.size) / np.maximum(errors, 1e-3)
+    # The last of the frames show it if the camera moves at all.
+    if np.median(errors) >= frames.factor * LOOSE or np.quantile(sure, 0.95) <= PLAINLY:
         return None
     at = np.minimum(sampled, len(motion.maps) - 1)
     known = np.isfinite(motion.errors[at])
     return motion if explains(small, rescaled(motion.maps[at], frames.factor), known) else None
-
-
-def _plainly(motion: CameraMotion, size: tuple[int, int], factor: int) -> bool:
-    """Does a camera move by far more than the errors of its maps, and are these small?"""
-    told = motion.errors[1:] < factor * LOOSE
-    # Share of the frames that tell of the camera's motion, if it is known.
-    if told.mean() < 0.5:
-        return False
-    sure = displacement(motion.maps[1:], size) / np.maximum(motion.errors[1:], 1e-3)
-    # Of the frames, the last of which show it if the camera moves at all.
-    return bool(np.quantile(sure, 0.95) > PLAINLY)

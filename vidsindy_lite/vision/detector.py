@@ -25,8 +25,6 @@ LEAST = 0.4
 """Smallest confidence of a detection. Detectors of this family are modest: the package's own gives
 0.44 to 0.9 to whole targets, more the smaller they are, and less than 0.3 to what is none."""
 
-_WEAK = 0.5  # of the largest confidence: below, a prediction is not averaged
-
 Predictions = Floats32
 """Centre (u, v), width, height and confidence of each anchor, shape (5, n)."""
 
@@ -51,14 +49,14 @@ class LearnedDetector:
     def __init__(self, weights: str | os.PathLike = WEIGHTS) -> None:
         import torch  # takes a second, which most videos do not need
 
-        from .network import Network, fused
+        from .network import Network
 
         weights = check_path("weights", weights)
         if not weights.is_file():
             raise FileNotFoundError(f"weights: no such file, got '{weights}'")
         network = Network()
         network.load_state_dict(torch.load(weights, weights_only=True))
-        self.network = fused(network.eval()).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self.network = network.eval().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def predict(self, image: Image) -> Predictions:
         """Predictions, (5, n), for an image (height, width, 3) uint8, red, green and blue."""
@@ -166,14 +164,14 @@ def detections(predictions: Predictions, least: float = LEAST, most: int = 3) ->
     list of Detection
     """
     found: list[Detection] = []
-    predictions = predictions[:, predictions[4] >= _WEAK * least]
+    predictions = predictions[:, predictions[4] >= least / 2]
     while len(found) < most and predictions.shape[1]:
         best = predictions[:, np.argmax(predictions[4])]
         if best[4] < least:
             break
         apart = np.hypot(*(predictions[:2] - best[:2, None])) / best[2:4].mean()
-        # Of its size: the distance within which predictions speak of one target.
-        agree = (apart <= 0.25) & (predictions[4] >= _WEAK * best[4])
+        # Within a quarter of its size predictions speak of one target, if they are half as sure.
+        agree = (apart <= 0.25) & (predictions[4] >= best[4] / 2)
         weight = predictions[4, agree]
         mean = np.average(predictions[:4, agree].astype(float), axis=1, weights=weight)
         found.append(Detection(mean[:2], mean[2:], float(best[4])))

@@ -13,23 +13,33 @@ Somebody who points at the target in one frame decides where its looks are learn
 """
 
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
 from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from ..checks import check_integer, check_number, shown
-from ..reading import check_file, read_tree
-from .background import Plate, carry, lights_of, noise_of, sampled
+from ..checks import check_integer
+from .background import (
+    LONGEST,
+    BackgroundModel,
+    Plate,
+    carry,
+    lights_of,
+    noise_of,
+    sample_frames,
+    sampled,
+)
 from .camera import LOOSE, CameraMotion, at_rest, camera_motion, rescaled
 from .candidates import (
     TOLD,
     Candidates,
+    Hint,
     Looks,
-    Path,
+    Motion,
     best_path,
     candidates,
     followed,
@@ -41,146 +51,6 @@ from .video import Reel, reduce
 
 _SHORTEST = 5  # frames of a path
 _LOOKS_ALONE = "no view tells it from its ground: it is followed by its looks alone"
-
-
-@dataclass(frozen=True)
-class Hint:
-    """Which of the things that move is the target: a box around it in one frame, or its colour.
-
-    Parameters
-    ----------
-    frame : int, optional
-        Number of the frame in which the box is drawn, from 0.
-    box : (u, v, width, height), optional
-        Around the target in that frame, close to it: left and upper edge, width and height, pixels.
-    colour : (red, green, blue), optional
-        Of the target, 0 to 255 each.
-
-    Raises
-    ------
-    ValueError
-        If there is neither a box with its frame nor a colour, or one of them breaks its rule.
-    """
-
-    frame: int | None = None
-    box: tuple[float, float, float, float] | None = None
-    colour: tuple[float, float, float] | None = None
-
-    def __post_init__(self) -> None:
-        if (self.frame is None) != (self.box is None):
-            raise ValueError(
-                f"box: must come with its frame, got frame={self.frame!r}, box={shown(self.box)}"
-            )
-        if self.box is None and self.colour is None:
-            raise ValueError("target: must be a frame and a box in it, or a colour, got neither")
-        if self.frame is not None:
-            object.__setattr__(self, "frame", check_integer("frame", self.frame))
-            box = _numbers("box", self.box, 4, "(u, v, width, height) in pixels")
-            if min(box[2:]) < 2:
-                raise ValueError(f"box: must be two pixels wide and high or more, got {box}")
-            object.__setattr__(self, "box", box)
-        if self.colour is not None:
-            colour = _numbers("colour", self.colour, 3, "(red, green, blue), 0 to 255 each")
-            if not 0 <= min(colour) <= max(colour) <= 255:
-                raise ValueError(f"colour: must be red, green, blue, 0 to 255 each, got {colour}")
-            object.__setattr__(self, "colour", colour)
-
-    def boxed(
-        self, size: tuple[int, int], frames: int, factor: int
-    ) -> tuple[int, Floats, Floats] | None:
-        """Frame, middle and sides of the box, in frames reduced by a factor; None without a box.
-
-        Raises
-        ------
-        ValueError
-            If the film has no such frame, or the middle of the box is not in its image.
-        """
-        if self.box is None or self.frame is None:
-            return None
-        if self.frame >= frames:
-            raise ValueError(f"target: its frame must be one of {frames}, got {self.frame}")
-        low, sides = np.array(self.box[:2]), np.array(self.box[2:])
-        middle = low + (sides - 1) / 2  # it begins at its first pixel
-        if (middle < 0).any() or (middle >= size).any():
-            raise ValueError(
-                f"box: must have its middle in the image of {size[0]} x {size[1]} pixels, "
-                f"got {_told(self.box)}"
-            )
-        return self.frame, (middle - (factor - 1) / 2) / factor, sides / factor
-
-    def likeness(self, colours: Floats, grounds: Floats) -> Floats:
-        """How like the colour that is told things (m, 3) are before grounds (m, 3), from 0 to 1.
-
-        Also in other light, and where blur mixes them with their ground.
-        """
-        told = np.array(self.colour or (0, 0, 0), float)
-        mixed = told - grounds
-        share = ((colours - grounds) * mixed).sum(axis=1) / np.maximum((mixed**2).sum(axis=1), 1)
-        ways = told, grounds + np.clip(share, 0.25, 1)[:, None] * mixed
-        return np.maximum(*(_alike(colours, way) for way in ways))
-
-    def unlike(self, colour: Floats) -> tuple[str, ...]:
-        """Has what is followed, of this red, green and blue, another colour than is told?"""
-        if self.colour is None or _alike(colour[None], np.array(self.colour, float))[0] > 0.5:
-            return ()
-        here = _told(colour.round().tolist())
-        return (f"what is followed has the colour {here}, not {_told(self.colour)} as told",)
-
-
-def _told(numbers: Sequence[float]) -> str:
-    """Numbers as a user writes them."""
-    return f"({', '.join(f'{number:g}' for number in numbers)})"
-
-
-def _alike(colours: Floats, told: Floats) -> Floats:
-    """How alike colours (m, 3) are to others, from 0 to 1, also in another light."""
-    shade = (colours * told).sum(axis=1) / np.maximum((colours**2).sum(axis=1), 1)
-    off = np.clip(shade, 0.7, 1.4)[:, None] * colours - told
-    return np.asarray(np.exp(-((off**2).sum(axis=1) / 70.0**2)))
-
-
-def _numbers(name: str, values: object, count: int, what: str) -> tuple[float, ...]:
-    if not isinstance(values, Sequence) or isinstance(values, str) or len(values) != count:
-        raise ValueError(f"{name}: must be {what}, got {shown(values)}")
-    return tuple(check_number(name, value) for value in values)
-
-
-def load_hints(path: str | os.PathLike) -> tuple[Hint | None, ...]:
-    """The hints of a rig file, one per camera: ``target = {frame = 10, box = [u, v, w, h]}``.
-
-    Parameters
-    ----------
-    path : path
-        A rig file that `Rig.load` reads.
-
-    Returns
-    -------
-    tuple of Hint or None
-
-    Raises
-    ------
-    ValueError
-        If a target is no hint; names file, camera and key.
-    """
-    tables = read_tree("path", check_file("path", path), ".toml").get("camera", ())
-    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        raise ValueError(f"path: must hold tables [[camera]], got {shown(tables)}, in '{path}'")
-    return tuple(_from_table(f"{path}: camera {i}", table) for i, table in enumerate(tables))
-
-
-def _from_table(where: str, table: Mapping[str, object]) -> Hint | None:
-    told = table.get("target")
-    if told is None:
-        return None
-    known = [field.name for field in fields(Hint)]
-    if not isinstance(told, dict) or not set(told) <= set(known):
-        raise ValueError(
-            f"{where}: target: must be a table of {', '.join(known)}, got {shown(told)}"
-        )
-    try:
-        return Hint(**told)
-    except ValueError as error:
-        raise ValueError(f"{where}: target: {error}") from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,7 +214,7 @@ def sighted(
 
 def _paths(
     seen: Candidates, hint: Hint | None, seed: tuple[int, Floats, Floats] | None
-) -> list[Path]:
+) -> list[Motion]:
     """The plainest paths, of what a hint allows."""
     if seed is not None:
         frame, centre, size = seed
@@ -354,7 +224,7 @@ def _paths(
         if not (here & near & alike).any():
             return []
         quality = np.where(here, np.where(near & alike, seen.quality + TOLD, -TOLD), seen.quality)
-        return [Path(best_path(seen._replace(quality=quality))[0], np.inf)]
+        return [Motion(best_path(seen._replace(quality=quality))[0], np.inf)]
     liked = seen
     if hint is not None and hint.colour is not None:
         liked = seen._replace(quality=seen.quality * hint.likeness(seen.colour, seen.behind))
@@ -513,16 +383,22 @@ def _confidence(errors: Floats | float) -> Floats:
     return np.asarray(np.exp(-np.asarray(errors) / 3))
 
 
-def _doubts(film: Film, seen: Candidates, paths: list[Path], hint: Hint | None) -> tuple[str, ...]:
+def _spot(film: Film, seen: Candidates, path: Motion) -> str:
+    """Where somebody may look at what moves along a path."""
+    row = path.rows[len(path.rows) // 2]
+    u, v = film.factor * seen.centre[row]
+    return f"e.g. in frame {seen.frame[row]} at ({u:.0f}, {v:.0f})"
+
+
+def _doubts(
+    film: Film, seen: Candidates, paths: list[Motion], hint: Hint | None
+) -> tuple[str, ...]:
     """What else moves about as plainly, and whether the camera is known."""
     doubts: tuple[str, ...] = ()
     others = [p for p in paths[1:] if p.rating > 0.5 * paths[0].rating]
     if others and hint is None:
-        row = others[0].rows[len(others[0].rows) // 2]
-        u, v = film.factor * seen.centre[row]
-        doubts += (f"something else moves about as plainly, e.g. in frame {seen.frame[row]} at "
-                   f"({u:.0f}, {v:.0f}): if that is the target, say so, "
-                   "target=Hint(frame=, box=)",)  # fmt: skip
+        doubts += (f"something else moves about as plainly, {_spot(film, seen, others[0])}: if "
+                   "that is the target, say so, target=Hint(frame=, box=)",)  # fmt: skip
     if not film.sure:
         doubts += ("the background is too plain to tell whether the camera moves: if so, its "
                    "motion is part of the track",)  # fmt: skip
@@ -653,3 +529,102 @@ def _filled(
     if not len(at) and np.isfinite(pixels[:, 0]).any():
         return replace(found, pixels=pixels, confidence=confidence, warnings=(_LOOKS_ALONE,))
     return replace(found, pixels=pixels, confidence=confidence)
+
+
+def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
+    """Track so many moving targets of a video, each where it is apart from the others.
+
+    Parameters
+    ----------
+    path : path
+        A video in which nothing else moves as plainly.
+    count : int
+        How many targets there are.
+
+    Returns
+    -------
+    tuple of Track
+        NaN wherever two targets meet. Behind a meeting a track may be that of another target. If
+        fewer things move, the last tracks are NaN throughout.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        If the file is missing or no video.
+    """
+    check_integer("count", count, least=1)
+    frames = Reel(path, LONGEST)
+    samples = sample_frames(frames)
+    # Before a plain background, all that could tell of a camera's motion may be the targets.
+    film = Film.of(frames, samples, BackgroundModel(samples).camera_rests)
+    seen, lights = sighted(film, targets=count)
+    n = len(lights)
+    # Paths of a target that may follow each other.
+    paths = plainest_paths(seen, most=count * 8)
+    lanes, strange = _lanes(seen, paths, count)
+    ways = [_joined([expected(seen, p.rows, film, n) for p in lane]) for lane in lanes]
+    touching = _touching(ways)
+    # One that is not seen may be in one with any of the others.
+    lost = np.ones((len(lanes), n), bool)
+    for missed, lane in zip(lost, lanes, strict=True):
+        missed[seen.frame[np.concatenate([path.rows for path in lane])]] = False
+    longest = max(strange, key=lambda path: len(path.rows), default=None)
+    doubts: tuple[str, ...] = ()
+    # Share of the frames in which one more thing moves, above which there is doubt.
+    if longest is not None and len(longest.rows) >= 0.2 * n:
+        doubts = (f"{Path(path).name}: one thing more moves than there are targets, "
+                  f"{_spot(film, seen, longest)}",)  # fmt: skip
+    tracks = []
+    lens = lens_of(samples, film, *ways)
+    for way, met, missed in zip(ways, touching, lost, strict=True):
+        apart = np.asarray(lost.sum(axis=0) == missed)
+        way.centre[met] = np.nan
+        tracks.append(finished(viewed(film, lens, way, lights), film.motion, doubts, apart))
+        doubts = ()
+    return (*tracks, *[nothing(film.motion, n)] * (count - len(tracks)))
+
+
+def _lanes(
+    seen: Candidates, paths: list[Motion], count: int
+) -> tuple[list[list[Motion]], list[Motion]]:
+    """The paths of each target, one after the other in time; and paths for which none is left."""
+    lanes: list[list[Motion]] = []
+    left = []
+    plainest = max((path.rating / len(path.rows) for path in paths), default=0.0)
+    taken = np.zeros((count, 1 + seen.frame.max(initial=0)), bool)
+    for path in sorted(paths, key=lambda path: -len(path.rows)):
+        # Worth of a candidate of a path, relative to those of the plainest.
+        if path.rating / len(path.rows) < 0.4 * plainest:
+            continue
+        first, last = seen.frame[path.rows[[0, -1]]]
+        free = np.flatnonzero(~taken[:, first : last + 1].any(axis=1))
+        if not len(free):
+            left.append(path)
+            continue
+        taken[free[0], first : last + 1] = True
+        if free[0] == len(lanes):
+            lanes.append([])
+        lanes[free[0]].append(path)
+    return lanes, left
+
+
+def _joined(ways: list[Ways]) -> Ways:
+    """The ways of paths that follow each other as one."""
+    whole, *others = ways
+    for way in others:
+        free = np.isnan(whole.centre[:, :1])
+        whole = Ways(*(np.where(free, b, a) for a, b in zip(whole, way, strict=True)))
+    return whole
+
+
+def _touching(ways: list[Ways]) -> list[Bools]:
+    """In which frames each target touches another one, or hides it."""
+    found = [np.zeros(len(ways[0].centre), bool) for _ in ways]
+    for (i, one), (j, other) in combinations(enumerate(ways), 2):
+        apart = np.linalg.norm(one.centre - other.centre, axis=1)
+        sizes = (one.box[:, 2:].max(axis=1) + other.box[:, 2:].max(axis=1)) / 2
+        # Sizes, and pixels more, between two targets that do not touch.
+        met = apart < 1.3 * sizes + 2.0
+        found[i] |= met
+        found[j] |= met
+    return found

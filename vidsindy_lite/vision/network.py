@@ -18,7 +18,6 @@ import numpy as np
 import torch
 from torch import nn
 from torch.nn import functional
-from torch.nn.utils.fusion import fuse_conv_bn_eval
 from torch.optim import lr_scheduler
 from tqdm import trange
 
@@ -117,17 +116,6 @@ def as_input(images: Image) -> torch.Tensor:
     colours = np.ascontiguousarray(images)
     planes = torch.from_numpy(colours).permute(0, 3, 1, 2)
     return planes.float().div_(255)  # permuted, the channels stay last in memory: the fast order
-
-
-def fused(module: Network) -> Network:
-    """Fold each batch normalisation into the convolution before it: the same values, faster."""
-    for child in module.modules():
-        if isinstance(child, _Conv):
-            convolution, normalisation, _ = child
-            assert isinstance(convolution, nn.Conv2d)
-            assert isinstance(normalisation, nn.BatchNorm2d)
-            child[0], child[1] = fuse_conv_bn_eval(convolution, normalisation), nn.Identity()
-    return module
 
 
 SEEN_BACKGROUNDS = ("plain", "sky", "hills", "wood")

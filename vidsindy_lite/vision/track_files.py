@@ -33,13 +33,12 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from ..arrays import Bools, Floats
 from ..reading import check_file, read_text, reading
-
-SUFFIXES = frozenset({".csv", ".tsv", ".txt", ".dat", ".xml"})
 
 _BINARY = {
     ".h5": "a table of DeepLabCut or SLEAP", ".hdf5": "a table in HDF5", ".slp": "a SLEAP project",
@@ -63,10 +62,14 @@ _PIXELS = (
     ("u", "v"), ("pixelx", "pixely"), ("x", "y"), ("x_px", "y_px"), ("position_x", "position_y"),
 )  # fmt: skip
 _WHOSE = ("track", "track_id", "particle", "id", "object_id", "tid", "individual")
-_CORNER = (("x", "y"), ("left", "top"), ("bb_left", "bb_top"), ("u", "v"), ("bbox_x", "bbox_y"))
-_WIDTH = (("w", "h"), ("width", "height"), ("bb_width", "bb_height"), ("bbox_w", "bbox_h"))
+_SIZED = tuple(product(
+    (("x", "y"), ("left", "top"), ("bb_left", "bb_top"), ("u", "v"), ("bbox_x", "bbox_y")),
+    (("w", "h"), ("width", "height"), ("bb_width", "bb_height"), ("bbox_w", "bbox_h")),
+))  # fmt: skip
+"""Corner and size of a box, as the names of their columns."""
 _OPPOSITE = (
-    ("x1", "y1", "x2", "y2"), ("xmin", "ymin", "xmax", "ymax"), ("left", "top", "right", "bottom"),
+    (("x1", "y1"), ("x2", "y2")), (("xmin", "ymin"), ("xmax", "ymax")),
+    (("left", "top"), ("right", "bottom")),
 )  # fmt: skip
 _UNSEEN = {"", "na", "n/a", "#n/a", "null", "none", "-", "--", "missing", "lost", "?"}
 _SEEN = (
@@ -358,17 +361,15 @@ def _track(
     Those of the world of a program may have any origin and unit.
     """
     doubts: tuple[str, ...] = ()
-    sized = [corner + size for corner in _CORNER for size in _WIDTH]
-    box, pair = (
-        next((keys for keys in known if set(keys) <= columns.keys()), None)
-        for known in ((*sized, *_OPPOSITE), _PIXELS)
-    )
+    boxes = (box for box in (*_SIZED, *_OPPOSITE) if {*box[0], *box[1]} <= columns.keys())
+    box = next(boxes, None)
+    pair = next((pair for pair in _PIXELS if set(pair) <= columns.keys()), None)
     if box:
-        low, high = (np.array([columns[key] for key in keys]) for keys in (box[:2], box[2:]))
-        sides = high if box in sized else high - low
+        low, high = (np.array([columns[key] for key in keys]) for keys in box)
+        sides = high if box in _SIZED else high - low
         # Edges of the first pixel are at -0.5 and 0.5; a box without an area is none.
         pixels = np.where((sides > 0).all(axis=0), low + sides / 2 - 0.5, np.nan).T
-        doubts += (f"{name}: the middles of its boxes are taken, of {', '.join(box)}",)
+        doubts += (f"{name}: the middles of its boxes are taken, of {', '.join(box[0] + box[1])}",)
     elif pair:
         pixels = np.column_stack([columns[key] for key in pair])
     else:

@@ -20,37 +20,15 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 
-from ..arrays import Bools
-from ..checks import check_instance, check_integer, shown
-from .background import (
-    LONGEST,
-    BackgroundModel,
-    sample_frames,
-    track_blobs,
-    view_distances,
-    whole_views,
-)
-from .candidates import Candidates, best_path, plainest_paths
-from .candidates import Path as Motion
+from ..checks import check_instance, shown
+from .background import LONGEST, BackgroundModel, sample_frames, whole_blobs
+from .candidates import Candidates, Hint, best_path
 from .detector import Detection, LearnedDetector, OnnxDetector, detections
-from .moving import (
-    Film,
-    Hint,
-    Track,
-    Ways,
-    expected,
-    finished,
-    follow,
-    lens_of,
-    nothing,
-    sighted,
-    viewed,
-)
+from .moving import Track, follow
 from .refining import scatter
 from .video import Reel, read_video, video_info
 
@@ -121,7 +99,8 @@ def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | 
     model.learn_target(samples)
     if detector == "auto" and model.several_colours:
         return follow(frames, samples, target)
-    found, blurred = _track_blobs(frames.whole, model)
+    pixels, confidence, blurred = whole_blobs(model, frames.whole)
+    found = Track(pixels, confidence, "background")
     if detector == "auto" and (blurred or not _plausible(found, target)):
         return follow(frames, samples, target)
     found = replace(found, warnings=model.unrest)
@@ -181,25 +160,6 @@ def check_detector(name: str | os.PathLike) -> None:
         raise FileNotFoundError(f"detector: no such file, got '{name}'")
 
 
-def _track_blobs(reel: Reel, model: BackgroundModel) -> tuple[Track, bool]:
-    """The background model's track, and whether outlines are too blurred for it.
-
-    It tells whole views by their outlines: where these are blurred, by motion or a codec, and many
-    views are left out, it is by the blur that they differ.
-    """
-    blobs = list(track_blobs(model, reel))
-    distance = view_distances(blobs)
-    whole = whole_views(distance)
-    centroids = np.array([b.centroid if b else (np.nan, np.nan) for b in blobs], float)
-    centroids[~whole] = np.nan
-    inside = np.array([b is not None and b.inside for b in blobs])
-    soft = [b.softness for b in blobs if b is not None and b.inside]
-    # Of a sharp outline it is 0.6, see `Blob`.
-    # Share of views that are whole, below which a blurred outline cannot be trusted.
-    blurred = bool(inside.any() and np.median(soft) > 1.0 and whole[inside].mean() < 0.95)
-    return Track(centroids, np.exp(-distance), "background"), blurred
-
-
 def _link_detections(path: str | os.PathLike, name: str | os.PathLike) -> Track:
     detector = LearnedDetector() if name == "learned" else OnnxDetector(name)
     chain = link([detections(detector.predict(frame)) for frame in read_video(path)])
@@ -233,113 +193,3 @@ def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
     for row in best_path(seen, len(sightings))[0]:
         chain[flat[row][0]] = flat[row][1]
     return chain
-
-
-def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
-    """Track so many moving targets of a video, each where it is apart from the others.
-
-    Parameters
-    ----------
-    path : path
-        A video in which nothing else moves as plainly.
-    count : int
-        How many targets there are.
-
-    Returns
-    -------
-    tuple of Track
-        NaN wherever two targets meet. Behind a meeting a track may be that of another target. If
-        fewer things move, the last tracks are NaN throughout.
-
-    Raises
-    ------
-    FileNotFoundError, ValueError
-        If the file is missing or no video.
-    """
-    check_integer("count", count, least=1)
-    frames = Reel(path, LONGEST)
-    samples = sample_frames(frames)
-    # Before a plain background, all that could tell of a camera's motion may be the targets.
-    film = Film.of(frames, samples, BackgroundModel(samples).camera_rests)
-    seen, lights = sighted(film, targets=count)
-    n = len(lights)
-    # Paths of a target that may follow each other.
-    paths = plainest_paths(seen, most=count * 8)
-    lanes, strange = _lanes(seen, paths, count)
-    ways = [_joined([expected(seen, p.rows, film, n) for p in lane]) for lane in lanes]
-    touching = _touching(ways)
-    # One that is not seen may be in one with any of the others.
-    lost = np.ones((len(lanes), n), bool)
-    for missed, lane in zip(lost, lanes, strict=True):
-        missed[seen.frame[np.concatenate([path.rows for path in lane])]] = False
-    doubts = _doubts(seen, strange, film.factor, n, Path(path).name)
-    tracks = []
-    lens = lens_of(samples, film, *ways)
-    for way, hidden, missed in zip(ways, touching, lost, strict=True):
-        apart = np.asarray(lost.sum(axis=0) == missed)
-        way.centre[hidden] = np.nan
-        tracks.append(finished(viewed(film, lens, way, lights), film.motion, doubts, apart))
-        doubts = ()
-    return (*tracks, *[nothing(film.motion, n)] * (count - len(tracks)))
-
-
-def _lanes(
-    seen: Candidates, paths: list[Motion], count: int
-) -> tuple[list[list[Motion]], list[Motion]]:
-    """The paths of each target, one after the other in time; and paths for which none is left."""
-    lanes: list[list[Motion]] = []
-    left = []
-    plainest = max((path.rating / len(path.rows) for path in paths), default=0.0)
-    taken = np.zeros((count, 1 + seen.frame.max(initial=0)), bool)
-    for path in sorted(paths, key=lambda path: -len(path.rows)):
-        # Worth of a candidate of a path, relative to those of the plainest.
-        if path.rating / len(path.rows) < 0.4 * plainest:
-            continue
-        first, last = seen.frame[path.rows[[0, -1]]]
-        free = np.flatnonzero(~taken[:, first : last + 1].any(axis=1))
-        if not len(free):
-            left.append(path)
-            continue
-        taken[free[0], first : last + 1] = True
-        if free[0] == len(lanes):
-            lanes.append([])
-        lanes[free[0]].append(path)
-    return lanes, left
-
-
-def _joined(ways: list[Ways]) -> Ways:
-    """The ways of paths that follow each other as one."""
-    whole, *others = ways
-    for way in others:
-        free = np.isnan(whole.centre[:, :1])
-        whole = Ways(*(np.where(free, b, a) for a, b in zip(whole, way, strict=True)))
-    return whole
-
-
-def _touching(ways: list[Ways]) -> list[Bools]:
-    """In which frames each target touches another one, or hides it."""
-    found = [np.zeros(len(ways[0].centre), bool) for _ in ways]
-    for (i, one), (j, other) in combinations(enumerate(ways), 2):
-        apart = np.linalg.norm(one.centre - other.centre, axis=1)
-        sizes = (one.box[:, 2:].max(axis=1) + other.box[:, 2:].max(axis=1)) / 2
-        # Sizes, and pixels more, between two targets that do not touch.
-        met = apart < 1.3 * sizes + 2.0
-        found[i] |= met
-        found[j] |= met
-    return found
-
-
-def _doubts(
-    seen: Candidates, strange: list[Motion], factor: int, frames: int, name: str
-) -> tuple[str, ...]:
-    """Does one thing more move than there are targets?"""
-    longest = max(strange, key=lambda path: len(path.rows), default=None)
-    # Share of the frames in which one more thing moves, above which there is doubt.
-    if longest is None or len(longest.rows) < 0.2 * frames:
-        return ()
-    row = longest.rows[len(longest.rows) // 2]
-    u, v = factor * seen.place[row]
-    return (
-        f"{name}: one thing more moves than there are targets, e.g. in frame {seen.frame[row]} at "
-        f"({u:.0f}, {v:.0f})",
-    )
