@@ -4,12 +4,12 @@
 
   video       reading and writing of video files, and of films that are folders of images
   track_files tracks as text files: DLTdv's, Tracker's, DeepLabCut's and ours
-  tracking    track: a video in, the target's pixels out; track_targets: of several targets; by
+  tracking    track: a video in, the target's pixels out, by
   background      what differs from a background at rest (the most exact)
   moving          what moves most plainly, if camera and background are not: camera takes out the
                   camera's motion, candidates are what differs from the ground or from other
                   frames, and the best path through them, which learns the looks of what is on it,
-                  or of what a hint points at; refining measures
+                  or of what a hint points at; refining measures; track_targets follows several
   detector        what looks like a target in a single frame: our network, or any YOLO-v8
   network     that network, in PyTorch, and its training on frames that are drawn here
   rendering   films of a scene: background, target, and the disturbances between them

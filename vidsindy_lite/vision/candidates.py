@@ -1,13 +1,14 @@
 """What may be the target in each frame: all that differs from the ground, or from other frames.
 
-Two differences, each a witness where the other is blind. That from the *ground* (`plate`) shows all
+Two differences, each a witness where the other is blind. That from the *ground* (`Plate`) shows all
 that is not ground, also what moves slowly; that from the *neighbours*, a few frames before and
 after, shows what moves before ground that changes, or that the plate knows badly. Each is cut at
 three levels: a target that touches its shadow, or a faint change of the light, is a part of one
 thing at a low level and stands alone at a higher one. What is connected is a candidate; which of
 them are the target is for the association to say.
 
-All of this happens on reduced frames, see `background`.
+All of this happens on reduced frames, see `background`. What a user knows of the target is a hint:
+a box around it in one frame, or its colour.
 
 A path gains the quality of its candidates and pays for leaving its motion, of constant velocity or
 constant acceleration, for changes of size and colour, and for gaps. Dynamic programming (Viterbi)

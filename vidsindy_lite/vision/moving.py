@@ -10,6 +10,10 @@
   refining      its places to a fraction of a pixel, in whole frames; doubts
 
 Somebody who points at the target in one frame decides where its looks are learned.
+
+Where two meet in an image, nobody can say which is which afterwards: who is who, across meetings
+and views, is for the cameras to tell (`cameras.identify`). So a track is that of one target from
+one meeting to the next.
 """
 
 import os

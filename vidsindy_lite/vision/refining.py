@@ -365,9 +365,8 @@ def _leave_out(
     t = frames[others] - frames[i]
     if len(others) < 4 or max(t[-1], 0) - min(t[0], 0) > 15:
         return 0.0, np.inf
-    basis = np.vander(t / 3, min(5, len(others)))
     quartic, parabola = (
-        np.linalg.lstsq(powers, places[others])[0][-1] for powers in (basis, basis[:, -3:])
+        np.polyfit(t, places[others], degree)[-1] for degree in (min(4, len(t) - 1), 2)
     )
     off, unsure = np.linalg.norm([quartic - places[i], quartic - parabola], axis=1)
     beyond = t.min() > 0 or t.max() < 0

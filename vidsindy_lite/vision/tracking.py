@@ -9,10 +9,6 @@ pixel. The paper has one of that kind, YOLO-v8; what such a detector sees in the
 linked here to one motion.
 
 A frame gets NaN where the target is not seen, or not for sure.
-
-Where two meet in an image, nobody can say which is which afterwards: who is who, across meetings
-and views, is for the cameras to tell (`cameras.identify`). So a track is that of one target from
-one meeting to the next.
 """
 
 from __future__ import annotations
