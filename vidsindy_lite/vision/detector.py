@@ -66,10 +66,11 @@ class LearnedDetector:
         """Predictions, (b, 5, n), for images of one size: many small ones are quicker at once."""
         import torch
 
-        from .network import COARSEST, as_input
+        from .network import as_input
 
         height, width = images.shape[1:3]
-        margins = ((0, 0), (0, -height % COARSEST), (0, -width % COARSEST), (0, 0))
+        # The sides of what the network takes are multiples of its coarsest stride.
+        margins = ((0, 0), (0, -height % 16), (0, -width % 16), (0, 0))
         with torch.inference_mode():
             found = self.network(as_input(np.pad(images, margins, "edge")))
             found[:, 4].sigmoid_()

@@ -28,7 +28,6 @@ from .detector import WEIGHTS
 from .rendering import BACKGROUNDS, COLOURS, Box, LabelledFrame, Scene, draw_frames
 
 STRIDE = 4  # pixels between two anchors
-COARSEST = 16  # pixels, of which the sides of an image are multiples
 
 
 class _Conv(nn.Sequential):

@@ -170,13 +170,14 @@ def _tracks(
     who = next((names.index(key) for key in _WHOSE if key in names), None)
     words = {row[who].strip() for row in rows} - {""} if who is not None else set()
     if who is not None and 0 < len(words) < max(len(rows), 2):  # else they count the rows
-        chosen = _chosen(sorted(words, key=lambda word: (len(word), word)), individual, any_=True)
+        whose = sorted(words, key=lambda word: (len(word), word))
+        chosen = _chosen(whose, individual, lenient=True)
         rows = [row for row in rows if row[who].strip() == chosen]
     values = _numbers(rows, width, names)
     if not header:
         if not 2 <= width <= 3:
             raise ValueError("must have a header, or columns u and v")
-        names = [*["frame" if _counts(values[:, 0]) else "t"][: width - 2], "u", "v"]
+        names = ["frame" if _counts(values[:, 0]) else "t", "u", "v"][-width:]
     frame = next((names.index(key) for key in _FRAME if key in names), None)
     if who is not None and frame is not None:
         values = values[np.argsort(values[:, frame], kind="stable")]
@@ -188,7 +189,7 @@ def _tracks(
         del columns["frame"]  # these are names of images
     told = [m for known in _SERIES for key in columns if (m := known.fullmatch(key))]
     if any(match["axis"] in "uvxy" for match in told):
-        return _of_series(name, columns, told, individual, any_=who is not None)
+        return _of_series(name, columns, told, individual, lenient=who is not None)
     return [_track(name, columns, of_world=units is None and _is_of_tracker(header))]
 
 
@@ -292,13 +293,11 @@ def _matching(names: Sequence[str], individual: str | None) -> Sequence[str]:
     return [name for name in names if said <= set(name.split()) or set(name.split()) <= said]
 
 
-def _chosen(names: Sequence[str], individual: str | None, *, any_: bool) -> str:
-    """The target that is meant, or the only one there is; `any_` if none is called like it."""
-    wanted = _matching(names, individual)
+def _chosen(names: Sequence[str], individual: str | None, *, lenient: bool) -> str:
+    """The target that is meant, or the only one there is; `lenient` if none need be called so."""
+    wanted = _matching(names, individual) or (names if lenient else [])
     if len(wanted) != 1:
-        wanted = wanted or names
-        if len(wanted) != 1 or not any_:
-            raise _several(wanted)
+        raise _several(wanted or names)
     return wanted[0]
 
 
@@ -320,7 +319,7 @@ def _of_poses(header: list[list[str]], coords: list[str]) -> list[str]:
 
 def _of_series(
     name: str, columns: Mapping[str, Floats], told: list[re.Match], individual: str | None, *,
-    any_: bool,
+    lenient: bool,
 ) -> list[TrackFile]:  # fmt: skip
     """The tracks of one target, by columns whose names say of what target or camera they are."""
     found: dict[tuple[str, int], dict[str, str]] = {}
@@ -335,7 +334,7 @@ def _of_series(
         for of, axes in found.items()
         if np.isfinite([columns[key] for key in axes.values()]).any()
     }
-    target = _chosen(sorted({one for one, _ in shown or found}), individual, any_=any_)
+    target = _chosen(sorted({one for one, _ in shown or found}), individual, lenient=lenient)
     shared = {key: x for key, x in columns.items() if key in _FRAME or _TIME.fullmatch(key)}
     # Of DLTdv and Argus the first pixel is 1; of Argus rows count up from the lowest one.
     below = told[0].groupdict().get("below")
