@@ -10,18 +10,17 @@
                   camera's motion, candidates are what differs from the ground or from other
                   frames, and the best path through them, which learns the looks of what is on it,
                   or of what a hint points at; refining measures; track_targets follows several
-  detector        what looks like a target in a single frame: our network, or any YOLO-v8
+  a detector      what looks like a target in a single frame: our network, or any YOLO-v8
   network     that network, in PyTorch, and its training on frames that are drawn here
   rendering   films of a scene: background, target, and the disturbances between them
 """
 
-from .detector import WEIGHTS, LearnedDetector, detections
 from .candidates import Hint, load_hints
 from .moving import Track, track_targets
 from .rendering import BACKGROUNDS, SHAPES, Scene, render, render_labelled, render_restless
 from .rendering import render_video
 from .track_files import TrackFile, read_tracks
-from .tracking import check_detector, track
+from .tracking import WEIGHTS, LearnedDetector, check_detector, detections, track
 from .video import (
     VideoInfo,
     frame_clock,

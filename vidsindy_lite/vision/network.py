@@ -24,8 +24,8 @@ from tqdm import trange
 from ..arrays import Floats, Floats32, Image
 from ..checks import check_integer, check_path
 from ..repository import write_file
-from .detector import WEIGHTS
 from .rendering import BACKGROUNDS, COLOURS, Box, LabelledFrame, Scene, draw_frames
+from .tracking import WEIGHTS
 
 STRIDE = 4  # pixels between two anchors
 
