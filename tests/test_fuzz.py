@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import read_calibration
 from vidsindy_lite.vision import load_hints, read_tracks, video_info
-from vidsindy_lite.vision.detector import OnnxDetector
+from vidsindy_lite.vision.tracking import OnnxDetector
 
 CLEAR = (ValueError, OSError)
 T = np.linspace(0, 10, 40)

@@ -289,11 +289,11 @@ def _train(options: argparse.Namespace) -> int:
     Its weights (detector.pt) and the log of the training (detector.json) go into the package. This
     takes a few minutes on one core.
     """
-    from .vision import training
+    from .vision import network
 
-    output = training.WEIGHTS if options.output is None else options.output
-    steps = training.STEPS if options.steps is None else options.steps
-    record = training.train(output, options.seed, steps)
+    output = network.WEIGHTS if options.output is None else options.output
+    steps = network.STEPS if options.steps is None else options.steps
+    record = network.train(output, options.seed, steps)
     print(f"{record['frames']} frames, loss {record['loss'][0]} to {record['loss'][-1]}: {output}")
     return 0
 

@@ -1,13 +1,15 @@
-"""Which witness of a camera's motion is asked first, and which is believed."""
+"""The motion of a camera: by corners, pixels or all frames, and which of them is believed."""
 
+import cv2
 import numpy as np
 import pytest
-from footage import Phone, render_phone
+from footage import Phone, render_phone, write_phone
 
+from vidsindy_lite import track
 from vidsindy_lite.vision import camera
-from vidsindy_lite.vision.background import sample_frames
-from vidsindy_lite.vision.camera import trembling
-from vidsindy_lite.vision.steadying import carry
+from vidsindy_lite.vision.background import carry, sample_frames
+from vidsindy_lite.vision.camera import CameraMotion, Look, stands_still, steadied, trembling
+from vidsindy_lite.vision.camera import align as align_on
 from vidsindy_lite.vision.video import Reel, write_video
 
 SKY = Phone("sky", 40, noise=3, image_size=(320, 240), frames=60)
@@ -55,3 +57,167 @@ def test_nothing_else_is_taken_for_a_motion_of_the_camera(tmp_path, monkeypatch,
 
 def test_what_moves_too_far_is_not_told(tmp_path):
     assert by_the_plate(film(tmp_path, 1, camera="held")[0]) is None
+
+
+SIZE = 960, 720
+
+
+def grains(seed=0):
+    """A picture full of corners."""
+    rng = np.random.default_rng(seed)
+    soft = cv2.GaussianBlur(rng.normal(size=SIZE[::-1]), (0, 0), 2)
+    grey = np.clip(128 + 40 * soft / soft.std(), 0, 255).astype(np.uint8)
+    return cv2.cvtColor(grey, cv2.COLOR_GRAY2RGB)
+
+
+def followed(*frames):
+    """The map of the first frame to the last."""
+    return np.linalg.inv(steadied(frames, 1).maps[-1])
+
+
+def test_a_plane_that_is_seen_more_from_the_side_has_a_map_of_eight_numbers():
+    tilt = np.array([[1, 0, -3], [0, 1, 4], [4e-6, -5e-6, 1]])
+    found = followed(grains(), cv2.warpPerspective(grains(), tilt, SIZE, flags=cv2.INTER_CUBIC))
+    corners = np.array([[100, 100], [860, 100], [860, 620], [100, 620.0]])
+    np.testing.assert_allclose(carry(found, corners), carry(tilt, corners), atol=0.2)
+
+
+@pytest.mark.parametrize(("share", "still"), [(0.0, False), (0.2, False), (0.45, True), (1, True)])
+def test_a_camera_moves_if_clearly_more_corners_share_a_motion_than_stay(share, still):
+    before = grains()
+    after = cv2.warpAffine(before, np.array([[1, 0, 1.8], [0, 1, 0]]), SIZE)
+    stays = np.s_[:, : int(share * SIZE[0])]
+    after[stays] = before[stays]
+    assert stands_still([before, after]) is still
+
+
+@pytest.mark.parametrize(("width", "told"), [(0.3, False), (1.0, True)])
+def test_what_one_large_thing_shares_is_its_own_motion_not_the_cameras(width, told):
+    # Before noise that is new in each frame: what moves is as wide as a share of the image. It must
+    # fill less than a tenth of it, else it may be the wall before which the camera moves.
+    def frame(place):
+        picture = np.random.default_rng(place).normal(128, 3, (*SIZE[::-1], 3))
+        side = (int(width * SIZE[0]), int(width * SIZE[1]))
+        left, top = (SIZE[0] - side[0]) // 2, (SIZE[1] - side[1]) // 2
+        moved = cv2.warpAffine(grains(), np.array([[1, 0, 2.5 * place], [0, 1, 0]]), SIZE)
+        window = np.s_[top : top + side[1], left : left + side[0]]
+        picture[window] = moved[window]
+        return np.clip(picture, 0, 255).astype(np.uint8)
+
+    frames = [frame(place) for place in range(4)]
+    assert (stands_still(frames) is False) == told
+
+
+def test_reduced_maps_and_their_errors_become_those_of_whole_pixels():
+    shift = np.array([[1, 0, 2], [0, 1, -3], [0, 0, 1.0]])
+    tilt = np.array([[1, 0, 0], [0, 1, 0], [0.001, 0, 1.0]])
+    maps = np.array([np.eye(3), shift, np.diag([1.2, 0.9, 1]), 2 * tilt])
+    motion = CameraMotion.of(maps, np.array([0.0, 0.25, 1, np.inf]), 4)
+    np.testing.assert_allclose(motion.errors, [0, 1, 4, np.inf])
+    assert motion.moves
+    # The reduced pixels (10, 20) lie at (41.5, 81.5), in the middle of four by four.
+    for here, (u, v) in zip(
+        motion.maps, [(10, 20), (12, 17), (12, 18), (10 / 1.01, 20 / 1.01)], strict=True
+    ):
+        end = carry(here, np.array([[41.5, 81.5]]))[0]
+        np.testing.assert_allclose(end, [4 * u + 1.5, 4 * v + 1.5])
+        assert here[2, 2] == pytest.approx(1)
+
+
+CLOUDY = 320, 240
+
+
+def align(before, after):
+    """The map of one view to another, about which nothing is known."""
+    return align_on(Look(before).grounds, Look(after).levels, np.eye(3))
+
+
+def sight(seed, here=None, noise=2.0, contrast=20, light=1.0):
+    """A cloudy scene of few corners, seen through a map of its pixels to those of the view."""
+    rng = np.random.default_rng(seed)
+    cloud = cv2.GaussianBlur(rng.normal(size=(300, 380)).astype(np.float32), (0, 0), 12)
+    scene = 130 + contrast * cloud / cloud.std()
+    move = np.array([[1, 0, -30], [0, 1, -30], [0, 0, 1.0]])
+    here = np.eye(3) if here is None else here
+    rng = np.random.default_rng([seed, int(1e6 * abs(here).sum())])
+    view = light * cv2.warpAffine(scene, (here @ move)[:2], CLOUDY, flags=cv2.INTER_LINEAR)
+    view = view[..., None] + rng.normal(0, noise, (*CLOUDY[::-1], 3))
+    return np.clip(view, 0, 255).astype(np.uint8)
+
+
+def similar(u, v, turn=0.0, scale=1.0):
+    c, s = scale * np.cos(turn), scale * np.sin(turn)
+    return np.array([[c, -s, u], [s, c, v], [0, 0, 1]])
+
+
+def about_the_middle(**change):
+    here = similar((CLOUDY[0] - 1) / 2, (CLOUDY[1] - 1) / 2)
+    return here @ similar(0, 0, **change) @ np.linalg.inv(here)
+
+
+@pytest.mark.parametrize(
+    ("move", "light"),
+    [
+        (about_the_middle(turn=0.06), 1.0),
+        (about_the_middle(scale=1.05), 1.0),
+        (similar(0.7, -0.4), 1.0),
+        (similar(-6, 9, 0.01), 1.1),
+        (similar(14, -3, -0.02, 1.01), 0.8),
+    ],
+)
+def test_shift_turn_and_scale_of_clouds(move, light):
+    found = align(sight(0), sight(0, move, light=light))
+    points = np.array([[40, 40, 1], [280, 40, 1], [160, 120, 1], [280, 200, 1.0]])
+    miss = np.linalg.norm((points @ (found.map - move).T)[:, :2], axis=1)
+    assert miss.max() < 0.1
+    assert miss.mean() <= 8 * found.error < 0.5
+
+
+def test_what_moves_on_its_own_is_left_aside():
+    move = similar(3, 2)
+    views = [sight(1), sight(1, move)]
+    for view, left in zip(views, (60, 110), strict=True):
+        view[60:180, left : left + 60] = (20, 20, 160)  # a large thing that goes elsewhere
+    found = align(*views)
+    assert np.linalg.norm(found.map[:2, 2] - move[:2, 2]) < 0.5
+
+
+@pytest.mark.parametrize("things", [0, 3])
+def test_noise_and_a_few_things_tell_nothing(things):
+    rng = np.random.default_rng(3)
+    views = []
+    for _ in range(2):
+        wall = 120 + np.linspace(0, 20, CLOUDY[0])[None, :, None] + np.zeros((CLOUDY[1], 1, 3))
+        for u, v in rng.integers(20, 200, (things, 2)):
+            wall[v : v + 12, u : u + 12] = 40
+        views.append(np.clip(wall + rng.normal(0, 3, wall.shape), 0, 255).astype(np.uint8))
+    assert align(*views).error > 2
+    assert things or stands_still(views) is None
+
+
+def test_all_pixels_tell_of_a_motion_where_there_are_no_corners():
+    move = similar(3, -4)
+    views = [sight(0), sight(0, move)]
+    assert stands_still(views) is False
+    motion = steadied(views, 1)
+    assert motion.errors[1] < 0.15
+    np.testing.assert_allclose(np.linalg.inv(motion.maps[1])[:2, 2], move[:2, 2], atol=0.1)
+    assert stands_still([views[0], sight(0, similar(0, 1e-6))]) is True
+
+
+def test_a_camera_held_before_a_plain_wall_is_doubted(tmp_path):
+    phone = Phone("plain", 20, camera="held", flicker=0.03, image_size=(320, 240), frames=40)
+    write_phone(tmp_path / "clip.mp4", phone, 3)
+    found = track(tmp_path / "clip.mp4")
+    assert any("too plain to tell whether the camera moves" in doubt for doubt in found.warnings)
+
+
+def test_the_error_of_a_map_is_about_that_by_which_it_misses():
+    errors, misses = [], []
+    for seed in range(6):
+        move = similar(1.3, -0.8, 0.004)
+        found = align(sight(seed, noise=4), sight(seed, move, noise=4))
+        points = np.array([[u, v, 1.0] for u in (20, 160, 300) for v in (20, 120, 220)])
+        errors.append(found.error)
+        misses.append(np.mean(((points @ (found.map - move).T) ** 2).sum(axis=1)) / 2)
+    assert 0.5 < np.sqrt(np.mean(misses) / np.mean(np.square(errors))) < 2

@@ -7,7 +7,7 @@ import pytest
 
 import vidsindy_lite
 from vidsindy_lite import Hint, track, write_video
-from vidsindy_lite.vision.hints import load_hints
+from vidsindy_lite.vision import load_hints
 
 
 @pytest.mark.parametrize(

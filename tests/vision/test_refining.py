@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.candidates import Plate
+from vidsindy_lite.vision.background import Plate
 from vidsindy_lite.vision.refining import (
     Lens,
     View,

@@ -8,13 +8,12 @@ from tiny_onnx import write_red_detector
 
 from vidsindy_lite import Hint
 from vidsindy_lite.vision import track_targets
-from vidsindy_lite.vision.detector import LEAST, Detection
 from vidsindy_lite.vision.rendering import (
     Scene,
     render_restless,
     render_video,
 )
-from vidsindy_lite.vision.tracking import check_detector, link, track
+from vidsindy_lite.vision.tracking import LEAST, Detection, check_detector, link, track
 from vidsindy_lite.vision.video import write_video
 
 SIZE = (256, 192)

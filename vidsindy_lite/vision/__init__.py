@@ -4,23 +4,23 @@
 
   video       reading and writing of video files, and of films that are folders of images
   track_files tracks as text files: DLTdv's, Tracker's, DeepLabCut's and ours
-  tracking    track: a video in, the target's pixels out; track_targets: of several targets; by
+  tracking    track: a video in, the target's pixels out, by
   background      what differs from a background at rest (the most exact)
-  moving          what moves most plainly, if camera and background are not: steadying and camera
-                  take out the camera's motion, candidates are what differs from the ground (plate)
-                  or from other frames, and the best path through them, which learns the looks of
-                  what is on it, or of what a hint points at (hints); refining measures
-  detector        what looks like a target in a single frame: our network, or any YOLO-v8
-  network     that network, in PyTorch; training trained it, on frames that are drawn here
+  moving          what moves most plainly, if camera and background are not: camera takes out the
+                  camera's motion, candidates are what differs from the ground or from other
+                  frames, and the best path through them, which learns the looks of what is on it,
+                  or of what a hint points at; refining measures; track_targets follows several
+  a detector      what looks like a target in a single frame: our network, or any YOLO-v8
+  network     that network, in PyTorch, and its training on frames that are drawn here
   rendering   films of a scene: background, target, and the disturbances between them
 """
 
-from .detector import WEIGHTS, LearnedDetector, detections
-from .hints import Hint, load_hints
+from .candidates import Hint, load_hints
+from .moving import Track, track_targets
 from .rendering import BACKGROUNDS, SHAPES, Scene, render, render_labelled, render_restless
 from .rendering import render_video
 from .track_files import TrackFile, read_tracks
-from .tracking import Track, check_detector, track, track_targets
+from .tracking import WEIGHTS, LearnedDetector, check_detector, detections, track
 from .video import (
     VideoInfo,
     frame_clock,

@@ -11,6 +11,12 @@ two, so that the *coverage* of each pixel,
 is known even along an anti-aliased edge, and the centroid is the mean of the pixel positions
 weighted with it. Being linear in the frame, it stays unbiased under image noise.
 
+Where the camera moves, the *plate* is the background as no single frame shows it: the median of
+frames of which each is carried into the first one by the camera's motion and, where the light or
+the exposure changes, brought into the same light. A target that covers the same ground in most of
+the frames is a part of that median; once its places are known, they are left out of it, and ground
+that no frame shows continues what is around it.
+
 Behind an occluder or across the image border the visible part of the target has another centroid
 than the target. It also has another *shape*, whereas whole views are alike up to rotation and size:
 that is how `view_distances` tells the one from the other.
@@ -33,14 +39,12 @@ from .video import Reel, reduce
 LONGEST = 480  # pixels of the longer side of a reduced frame
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
 STRIP = 64  # rows of an image that are sorted at once: what they need stays in the cache
-_RING = 2  # pixels on both sides of the target's outline whose coverage is estimated
-_BORDER = 3  # coarse pixels around a place that show how its surroundings continue
 _OFTEN = 0.1  # share of the samples in which other things differ: more are unrest
-_NEAR = 16  # coarse pixels, within which several things that differ may be one target
 _SHAKY = 0.15  # pixels of displacement above which a camera is not at rest
 _TOO_LARGE = 0.25  # share of the image that no target fills
 
-_DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RING + 1, 2 * _RING + 1))
+# Two pixels on both sides of the target's outline, whose coverage is estimated.
+_DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
 
 Window = tuple[slice, slice]
 _Look = tuple[Floats, float, float]
@@ -95,6 +99,12 @@ def hull(mask: Bools) -> Ints:
     return np.asarray(cv2.convexHull(ends.astype(np.int32))[:, 0], int)
 
 
+def carry(maps: NDArray, points: Floats) -> Floats:
+    """Points (n, 2) taken through one map (3, 3), or each through its own (n, 3, 3)."""
+    ends = np.einsum("...ij,...j->...i", maps, np.column_stack([points, np.ones(len(points))]))
+    return ends[:, :2] / ends[:, 2:]
+
+
 def sampled(frames: int) -> Ints:
     """The numbers of about 21 frames spread evenly over a clip of so many."""
     return np.unique(np.linspace(0, frames - 1, 21).round().astype(int))
@@ -127,6 +137,14 @@ def median_image(frames: Image) -> Image:
     return result
 
 
+def _around(box: Sequence[int] | NDArray[np.int32], margin: int) -> Window:
+    """The window of an image from so far before a box (left, top, width, height) to behind it."""
+    left, top, width, height = box[:4]
+    return np.s_[
+        max(top - margin, 0) : top + height + margin, max(left - margin, 0) : left + width + margin
+    ]
+
+
 def _remove_ghosts(background: Image, samples: Image, coarse: Image, floor: float) -> None:
     """Correct in place a background that contains the target where it stayed for long.
 
@@ -145,20 +163,17 @@ def _remove_ghosts(background: Image, samples: Image, coarse: Image, floor: floa
         group = differs[:, labels == k].mean(axis=1) > 0.5
         if group.all() or not group.any():
             continue
-        left, top, width, height = stats[k, :4]
-        right, bottom = left + width + _BORDER, top + height + _BORDER
-        left, top = max(left - _BORDER, 0), max(top - _BORDER, 0)
-        window = np.s_[top:bottom, left:right]
+        window = _around(stats[k], 3)  # coarse pixels that show how its surroundings continue
         place = np.asarray(cv2.dilate((labels[window] == k).astype(np.uint8), np.ones((3, 3))))
         inside = place > 0
         around = cv2.inpaint(reduced[window], place, 3, cv2.INPAINT_TELEA)
         looks = [np.median(coarse[:, *window][g], axis=0)[inside] for g in (group, ~group)]
         off = [np.abs(look - around[inside]).sum() for look in looks]
-        window = np.s_[_COARSE * top : _COARSE * bottom, _COARSE * left : _COARSE * right]
-        view = background[window]
+        whole = tuple(slice(_COARSE * side.start, _COARSE * side.stop) for side in window)
+        view = background[whole]
         mask = place.repeat(_COARSE, 0).repeat(_COARSE, 1)[: view.shape[0], : view.shape[1]] > 0
         better = group if off[0] < off[1] else ~group
-        view[mask] = median_image(samples[:, *window][better])[mask]
+        view[mask] = median_image(samples[:, *whole][better])[mask]
 
 
 def _others(changes: list[Floats32], floor: float) -> float:
@@ -173,15 +188,12 @@ def _others(changes: list[Floats32], floor: float) -> float:
         largest = _largest_component(differs)
         if largest is None:
             continue
-        left, top, width, height, area = largest[1]
-        near = np.s_[
-            max(top - _NEAR, 0) : top + height + _NEAR, max(left - _NEAR, 0) : left + width + _NEAR
-        ]
-        differs[near] = False
+        # Coarse pixels, within which several things that differ may be one target.
+        differs[_around(largest[1], 16)] = False
         other = _largest_component(differs)
         # Coarse pixels in one place that are more than noise.
         found.append(
-            area > _TOO_LARGE * differs.size
+            largest[1][cv2.CC_STAT_AREA] > _TOO_LARGE * differs.size
             or (other is not None and other[1][cv2.CC_STAT_AREA] >= 4)
         )
     return float(np.mean(found)) if found else 0.0
@@ -362,7 +374,7 @@ class BackgroundModel:
             return None
         corner, extent = found[1][:2], found[1][2:4]
         centre = _COARSE * (corner + (extent - 1) / 2) + (_COARSE - 1) / 2
-        return centre, _COARSE * (extent.max() / 2 + 1) + 2 * _RING
+        return centre, _COARSE * (extent.max() / 2 + 1) + 4
 
     def measure(self, frame: Image, centre: Floats, half: float) -> Blob | None:
         """The target within `half` pixels of `centre`, if it is there."""
@@ -400,7 +412,7 @@ class BackgroundModel:
 
 
 def _erode(label: Image) -> Image:
-    """A mask without its rim of `_RING` pixels."""
+    """A mask without its rim of two pixels."""
     eroded = cv2.erode(label, _DISC, borderType=cv2.BORDER_CONSTANT, borderValue=0)
     return np.asarray(eroded, np.uint8)
 
@@ -485,9 +497,180 @@ def view_distances(blobs: Sequence[Blob | None]) -> Floats:
     return found
 
 
-def whole_views(distance: Floats) -> Bools:
-    """Frames (n,) in which the whole target is seen, given their `view_distances`.
+def whole_blobs(model: BackgroundModel, frames: Iterable[Image]) -> tuple[Floats, Floats, bool]:
+    """Centroids of the whole target (n, 2), NaN where it is not seen, and how sure each view is.
 
-    A view beside a distant one may be cut a little: it must be twice as close.
+    And whether outlines are too blurred to tell whole views by: where these are blurred, by motion
+    or a codec, and many views are left out, it is by the blur that they differ.
     """
-    return ~ndimage.binary_propagation(distance > 1, mask=distance > 0.5)
+    blobs = list(track_blobs(model, frames))
+    distance = view_distances(blobs)
+    # A view beside a distant one may be cut a little: it must be twice as close.
+    whole = ~ndimage.binary_propagation(distance > 1, mask=distance > 0.5)
+    centroids = np.array([b.centroid if b else (np.nan, np.nan) for b in blobs], float)
+    centroids[~whole] = np.nan
+    inside = np.array([b is not None and b.inside for b in blobs])
+    soft = [b.softness for b in blobs if b is not None and b.inside]
+    # Of a sharp outline it is 0.6, see `Blob`.
+    # Share of views that are whole, below which a blurred outline cannot be trusted.
+    blurred = bool(inside.any() and np.median(soft) > 1.0 and whole[inside].mean() < 0.95)
+    return centroids, np.exp(-distance), blurred
+
+
+class Plate:
+    """The steadied background, of frames of one size.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (m, height, width, 3), uint8
+    maps : ndarray, shape (m, 3, 3)
+        Where each lies in the first frame.
+    known : ndarray, shape (m,), bool
+        Which of the maps can be trusted.
+    hidden : ndarray, shape (m, 4), optional
+        What of each sample is not the ground: left, top, width, height; NaN for nothing.
+    lights : ndarray, shape (m, 3), optional
+        How much brighter each sample is, see `lights_of`; by default all are in the same light.
+    """
+
+    def __init__(
+        self, samples: Image, maps: Floats, known: Bools, hidden: Iterable[Floats] | None = None,
+        lights: Floats32 | None = None,
+    ) -> None:  # fmt: skip
+        self.size = np.array(samples.shape[2:0:-1])
+        self.moves = not np.allclose(maps, np.eye(3))
+        corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * (self.size - 1.0)
+        ends = [carry(h, corners) for h in maps[known]]
+        low = np.floor(np.percentile([e.min(axis=0) for e in ends], 5, axis=0))
+        high = np.ceil(np.percentile([e.max(axis=0) for e in ends], 95, axis=0))
+        middle = carry(maps[known][len(maps[known]) // 2], corners).mean(axis=0)
+        # Frames that the plate may hold, side by side.
+        reach = self.size * np.sqrt(2.5) / 2
+        low = np.floor(np.maximum(low, middle - 1.5 * reach))
+        high = np.minimum(high, middle + 1.5 * reach)
+        self.shift = np.array([[1, 0, -low[0]], [0, 1, -low[1]], [0, 0, 1.0]])
+        width, height = (int(x) for x in np.ceil(high - low) + 1)
+        shows = [np.full(samples.shape[1:3], 255, np.uint8)] * len(samples)
+        if hidden is not None:
+            shows = [_without(one, box) for one, box in zip(shows, hidden, strict=True)]
+        use = np.flatnonzero(known)
+        moves = [self.shift @ maps[i] for i in use]
+        shows = [shows[i] for i in use]
+        lights = np.ones((len(samples), 3), np.float32) if lights is None else lights
+        # The samples are views: copies would fill the memory.
+        self.image, count = _masked_median(
+            [samples[i] for i in use], shows, moves, np.reciprocal(lights[use]), (width, height)
+        )
+        # Samples that must show a place of the plate.
+        self.valid = np.where(count >= min(3, len(use)), 255, 0).astype(np.uint8)
+        if hidden is not None:
+            self._continue(shows, moves, count)
+
+    def _continue(self, shows: Sequence[Image], moves: Sequence[Floats], count: Image) -> None:
+        """Ground that the target hides is what is seen of it, or what is around it."""
+        size = self.image.shape[1::-1]
+        covered = np.zeros(self.valid.shape, np.uint8)
+        for one, move in zip(shows, moves, strict=True):
+            there = cv2.warpPerspective(255 - one, move, size, flags=cv2.INTER_NEAREST)
+            covered |= np.asarray(there, np.uint8)
+        self.valid |= covered
+        never = ((count == 0) & (covered > 0)).astype(np.uint8)
+        if never.any():
+            window = _around(cv2.boundingRect(never), 8)
+            self.image[window] = cv2.inpaint(
+                self.image[window], never[window], 3, cv2.INPAINT_TELEA
+            )
+
+    def laid(self, image: Floats32, here: Floats) -> Floats32:
+        """An image over the plate, as the frame that the map carries sees it; 1000 beyond it."""
+        back, size = np.linalg.inv(self.shift @ here), self.size.tolist()
+        return np.asarray(cv2.warpPerspective(image, back, size, borderValue=1e3), np.float32)
+
+    def seen_from(
+        self, here: Floats, low: Floats | None = None, high: Floats | None = None, step: int = 1
+    ) -> tuple[Image, Bools]:
+        """The background in the frame that the map carries, or a window of it; where it is known.
+
+        Only every pixel of some `step` in each row and column.
+        """
+        left, top = np.zeros(2, int) if low is None else low
+        size = (self.size if high is None else high) - [left, top]
+        to_window = np.array([[1, 0, -left], [0, 1, -top], [0, 0, step]]) / step
+        size = (-(-size // step)).tolist()
+        back = to_window @ np.linalg.inv(self.shift @ here)
+        image = cv2.warpPerspective(self.image, back, size, flags=cv2.INTER_LINEAR)
+        valid = cv2.warpPerspective(self.valid, back, size, flags=cv2.INTER_NEAREST)
+        return np.asarray(image, np.uint8), np.asarray(valid) > 0
+
+
+def _without(shows: Image, box: Floats) -> Image:
+    """What a sample shows of the ground: not what is in an ellipse around a box."""
+    if not np.isfinite(box).all():
+        return shows
+    centre, axes = box[:2] + (box[2:] - 1) / 2, 0.6 * box[2:] + 2
+    ends = tuple(np.rint(centre).astype(int).tolist()), tuple(np.ceil(axes).astype(int).tolist())
+    return np.asarray(cv2.ellipse(shows.copy(), *ends, 0, 0, 360, 0, -1), np.uint8)
+
+
+def _masked_median(
+    samples: Sequence[Image], shows: Sequence[Image], moves: Sequence[Floats], gains: Floats32,
+    size: tuple[int, int],
+) -> tuple[Image, Image]:  # fmt: skip
+    """The median of the samples that show each pixel of a canvas, by how many it is shown.
+
+    Strip by strip, as the samples that are carried there would fill the memory. Where a sample
+    shows nothing, black and white take turns, which does not move the median.
+    """
+    width, height = size
+    result = np.zeros((height, width, 3), np.uint8)
+    count = np.zeros((height, width), np.uint8)
+    for top in range(0, height, STRIP):
+        strip = (width, min(STRIP, height - top))
+        up = np.array([[1, 0, 0], [0, 1, -top], [0, 0, 1.0]])
+        layers = np.empty((len(samples), strip[1], width, 3), np.uint8)
+        here = np.zeros((strip[1], width), np.uint8)
+        for k, (sample, full, move) in enumerate(zip(samples, shows, moves, strict=True)):
+            there = cv2.warpPerspective(sample, up @ move, strip)
+            layers[k] = cv2.multiply(there, np.array([*gains[k], 0.0]))
+            shown = cv2.warpPerspective(full, up @ move, strip, flags=cv2.INTER_NEAREST) > 0
+            missing = k - here  # samples before it that show nothing
+            layers[k][~shown] = np.where(missing[~shown] % 2, 255, 0)[:, None]
+            here += shown
+        result[top : top + strip[1]] = median_image(layers)
+        count[top : top + strip[1]] = here
+    return result, count
+
+
+def lights_of(samples: Image, maps: Floats, known: Bools) -> Floats32:
+    """How much brighter (m, 3) each of the samples of a film is than most of them."""
+    plate = Plate(samples, maps, known)
+    return np.array([light(sample, *plate.seen_from(here))
+                     for sample, here in zip(samples, maps, strict=True)])  # fmt: skip
+
+
+def least_difference(noise: float) -> float:
+    """Grey levels below which nothing differs from the ground, in this noise of a pixel."""
+    return float(np.clip(5 * noise, 8.0, 60.0))
+
+
+def tolerance(ground: Image, least: float, *, moves: bool) -> Floats32:
+    """Grey levels by which frames may differ from each place of their ground.
+
+    An edge may be displaced, by more if the camera moves.
+    """
+    grey = cv2.cvtColor(ground, cv2.COLOR_RGB2GRAY)
+    slope = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
+    return np.asarray(least + (0.5 if moves else 0.12) * slope.astype(np.float32), np.float32)
+
+
+def noise_of(samples: Image, maps: Floats, plate: Plate) -> float:
+    """Of a pixel, in grey levels: of the quieter samples, which differ from the plate by that."""
+    found = []
+    step = max(3, samples.shape[2] // 640)
+    for sample, here in zip(samples, maps, strict=True):
+        then, known = plate.seen_from(here, step=step)
+        now = sample[::step, ::step]
+        if known.any():
+            differs = changes(now, then, light(now, then, known))[known]
+            found.append(1.4826 * np.median(np.abs(differs)))
+    return float(np.median(found)) if found else 0.0

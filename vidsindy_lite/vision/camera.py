@@ -1,4 +1,17 @@
-"""The motion of a film's camera, asked of several witnesses until one is sure.
+"""Motion of the camera: where each frame of a trembling or held camera lies in the first one.
+
+A camera is at rest unless its frames say otherwise: a map that is not needed only adds its errors.
+Several witnesses are asked until one is sure.
+
+Corners of a key frame are followed into the frames after it (Lucas-Kanade); the homography that
+most of them obey, counted by the parts of the image that they cover, is the camera's motion, since
+the target is in few of these parts however much texture it has. Where there are few corners, all
+pixels tell the motion. A new key frame is taken when little is left of the last one.
+
+Clouds, waves and plain walls have no corners, but all of their pixels together tell a motion to a
+fraction of a pixel, and how well they tell it. A shift, turn and scale, a gain and an offset of the
+light are fitted by least squares (Gauss and Newton; Lucas and Kanade 1981), from coarse to fine,
+with weights that leave aside what moves on its own.
 
 A motion can be wrong with small errors: before a smooth wall nothing but the target has corners,
 and then the target's motion is taken for the camera's. But the plate that it makes, and the one of
@@ -7,7 +20,7 @@ own is in few of these: so a motion is taken only if it explains the frames bett
 
 Two frames of a sky share little but noise, and corners of noise tell no motion. But the median of
 many frames of a camera that trembles is that sky nearly without noise, only a little blurred, and
-each frame laid on it (`steadying`) tells its own small motion. Whether that is one is for the
+each frame laid on it tells its own small motion. Whether that is one is for the
 halves of the image to say: if the camera moves, both move alike; noise, a codec's errors and what
 moves on its own are not the same in both. By how much the halves differ also says how exact the
 motion is: errors of a codec and of the plate itself reach over many pixels, which no pixel's misfit
@@ -17,33 +30,420 @@ though.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import changes, lengths, light
-from .plate import Plate
-from .steadying import (
-    PARTS,
-    PLAINLY,
-    Aligned,
-    CameraMotion,
-    Ground,
-    align,
-    at_rest,
-    carry,
-    displacement,
-    grounds,
-    pyramid,
-    rescaled,
-    stands_still,
-    steadied,
-)
+from .background import Plate, carry, changes, lengths, light
 from .video import Reel
 
+_BEYOND = -1e6  # in place of grey levels where nothing is shown: what it has a part in is below 0
+_STEP = 8.0  # pixels by which the guess may be wrong
+PARTS = 12  # into which each side of an image is cut: of one corner, and of one error, each
 LOOSE = 1.0  # pixels (reduced ones if it is to be used at all) to which a camera's motion is known
+_STILL = 0.25  # reduced pixels by which a corner at rest may seem to move
+_VAGUE = 3.0  # reduced pixels: a map that is known no better is not known
+PLAINLY = 10.0  # standard errors of a displacement that is one
+_MANY = 60  # corners that need no other witness
+_AGREE = 0.25  # share of the corners that must do so: of those of mere noise, 0.15 to 0.24 agree
+
+
+class Ground(NamedTuple):
+    """One level of a view on which others are laid.
+
+    Its grey levels, by what each pixel changes with shift, turn, scale and light, (6, h, w), and
+    how much each may tell.
+    """
+
+    grey: Floats32
+    slopes: Floats32
+    share: Floats32
+
+    @classmethod
+    def of(cls, grey: Floats32) -> Ground:
+        slopes = _slopes(grey)
+        power = _by_blocks(slopes[0] ** 2 + slopes[1] ** 2)
+        # Times what a usual block tells, that one block may tell at most.
+        fair = np.minimum(1, 4.0 * np.median(power) / np.maximum(power, 1e-9))
+        share = cv2.resize(fair, grey.shape[::-1], interpolation=cv2.INTER_LINEAR)
+        return cls(grey, slopes, np.asarray(share, np.float32))
+
+
+class Aligned(NamedTuple):
+    """The map (3, 3) of one view to another, and the standard error of the places it gives."""
+
+    map: Floats
+    error: float
+
+
+class Look:
+    """A reduced frame as it is compared with others; what of it is not needed is not worked out."""
+
+    def __init__(self, small: Image) -> None:
+        self.grey = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32)
+
+    @cached_property
+    def levels(self) -> list[Floats32]:
+        """Its grey levels at a half, a quarter, ... of its size."""
+        levels = [self.grey]
+        while len(levels) <= 4 and min(levels[-1].shape) >= 32:
+            levels.append(np.asarray(cv2.pyrDown(levels[-1]), np.float32))
+        # So soft that linear interpolation neither shifts nor softens them (the cubic one shifts).
+        return [np.asarray(cv2.GaussianBlur(one, (0, 0), 1), np.float32) for one in levels[1:]]
+
+    @cached_property
+    def grounds(self) -> list[Ground]:
+        """These, as others are laid on them."""
+        return [Ground.of(grey) for grey in self.levels]
+
+    @cached_property
+    def relief(self) -> Image:
+        """What stands out from its surroundings, whatever the light."""
+        grey = np.asarray(cv2.GaussianBlur(self.grey, (0, 0), 1))
+        mean = cv2.blur(cv2.blur(grey, (21, 21)), (21, 21))  # what is smoother than this is light
+        relief = 128 + 250 * (grey - mean) / (mean + 20)  # below 20, all is dark
+        return np.clip(relief, 0, 255).astype(np.uint8)
+
+    @cached_property
+    def corners(self) -> Floats:
+        """The best corner of each part of the image that has one, (m, 2): none counts twice."""
+        sharp = np.asarray(cv2.cornerMinEigenVal(self.relief, 9, ksize=3))
+        height, width = (side // PARTS for side in sharp.shape)
+        if not height or not width:
+            return np.zeros((0, 2))
+        whole = sharp[: height * PARTS, : width * PARTS].reshape(PARTS, height, PARTS, width)
+        parts = whole.swapaxes(1, 2).reshape(PARTS**2, -1)
+        best = parts.argmax(axis=1)
+        row, column = np.divmod(np.arange(PARTS**2), PARTS)
+        found = np.column_stack([column * width + best % width, row * height + best // width])
+        # Smallest eigenvalue of the gradient's covariance in a corner, grey levels squared.
+        return found[parts.max(axis=1) > 2.0 / 255**2].astype(float)
+
+    def follow(self, other: Look, guess: Floats) -> tuple[Floats, Floats]:
+        """Where its corners are, and where they are found in another image, near a guess (3, 3)."""
+        if not len(self.corners):
+            return self.corners, self.corners
+        points = self.corners.astype(np.float32)[:, None]
+        near = carry(guess, self.corners).astype(np.float32)[:, None].copy()
+        flown, found, _ = cv2.calcOpticalFlowPyrLK(
+            self.relief, other.relief, points, near, winSize=(15, 15), maxLevel=3,
+            flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+        )  # fmt: skip
+        ends = np.asarray(flown[:, 0], float)
+        within = ((ends >= 0) & (ends < other.relief.shape[::-1])).all(axis=1)
+        good = (np.asarray(found)[:, 0] > 0) & within
+        return self.corners[good], ends[good]
+
+
+def align(before: list[Ground], after: list[Floats32], guess: Floats) -> Aligned | None:
+    """The map of one view to another, from a guess; None where they have little in common.
+
+    Its error is infinite where the views tell no more than the guess.
+
+    Parameters
+    ----------
+    before : list of Ground
+    after : list of ndarray
+        Of `pyramid`.
+    guess : ndarray, shape (3, 3)
+        In pixels of the images of which the pyramids are.
+    """
+    found, fitted = _as_similarity(guess, 2 * np.array(before[0].grey.shape[::-1])), None
+    for level in range(len(before), 0, -1):
+        scale, back = (np.diag([x, x, 1.0]) for x in (0.5**level, 2.0**level))
+        here = scale @ found @ back
+        # Grey levels from which on a pixel is left aside.
+        loose = 40.0 if level > 1 else 0.0
+        fitted = _fit(before[level - 1], after[level - 1], here, scale[0, 0], loose)
+        if fitted is None:
+            return None
+        found = back @ fitted.map @ scale
+    if fitted is None:  # images too small for a pyramid
+        return None
+    error = 2 * fitted.error
+    return Aligned(found, error if error < _STEP else np.inf)
+
+
+def _as_similarity(guess: Floats, size: Ints) -> Floats:
+    """The shift, turn and scale nearest to a guess in an image (width, height).
+
+    Other parts of it, as perspective, would stay as they are, since nothing is fitted to them.
+    """
+    corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * size.astype(float)
+    # As complex numbers, places are turned, scaled and shifted by a line.
+    turn, shift = np.polyfit(corners @ [1, 1j], carry(guess, corners) @ [1, 1j], 1)
+    return np.array(
+        [[turn.real, -turn.imag, shift.real], [turn.imag, turn.real, shift.imag], [0, 0, 1]]
+    )
+
+
+def _fit(
+    ground: Ground, view: Floats32, here: Floats, scale: float, loose: float
+) -> Aligned | None:
+    """One level: Gauss-Newton steps of which each refines the map by what the key's slopes say."""
+    key, slopes, share = ground
+    height, width = key.shape
+    middle = np.array([[1, 0, (width - 1) / 2], [0, 1, (height - 1) / 2], [0, 0, 1.0]])
+    to_middle = np.linalg.inv(middle)
+    steep = slopes.reshape(6, -1)
+    # What the guess may be wrong by: shift, turn and scale, gain and offset of the light.
+    sure = np.array([scale * _STEP, scale * _STEP, 0.03, 0.03, 1, 100])
+    prior = np.diag(1 / sure**2)
+    gain, offset = 1.0, 0.0
+    framed = np.full_like(view, _BEYOND)
+    inner = np.s_[2:-2, 2:-2]  # the rim depends on what lies beyond the image
+    framed[inner] = view[inner]
+    within = framed >= 0
+    for step in range(6):
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        laid = cv2.warpAffine(framed, here[:2], (width, height), flags=flags, borderValue=_BEYOND)
+        shown = np.asarray(laid, np.float32)
+        known = within & (shown >= 0)
+        if np.count_nonzero(known) < 0.3 * known.size:
+            return None
+        miss = shown - gain * key - offset
+        if step == 0:
+            offset = np.median(miss[known][::2])
+            miss -= offset
+        # Grey levels; a deviation without any noise.
+        spread = max(1.4826 * np.median(np.abs(miss[known])[::2]), 0.3)
+        bound = max(3 * spread, loose / 2**step)
+        weight = share * known / (1 + (miss / bound) ** 2) ** 2
+        heavy = steep * weight.ravel()
+        normal = heavy @ steep.T + spread**2 * prior
+        delta = np.linalg.solve(normal, heavy @ miss.ravel())
+        shift = np.array(
+            [[1 + delta[2], -delta[3], delta[0]], [delta[3], 1 + delta[2], delta[1]], [0, 0, 1]]
+        )
+        here = here @ middle @ np.linalg.inv(shift) @ to_middle
+        gain, offset = float(gain + delta[4]), float(offset + delta[5])
+        # Pixels of a level of a step that is no longer worth another.
+        if np.hypot(delta[0], delta[1]) + np.hypot(delta[2], delta[3]) * width / 2 < 0.01:
+            break
+    if loose:  # a finer level says how sure the map is
+        return Aligned(here, np.inf)
+    miss = miss - np.tensordot(delta.astype(np.float32), slopes, 1)
+    seen = _slopes(np.where(known, (shown - offset) / gain, key).astype(np.float32))
+    # Noise has slopes, too, but not the same in both views.
+    told = heavy @ seen.reshape(6, -1).T
+    value, direction = np.linalg.eigh((told + told.T) / 2)
+    information = (direction * np.maximum(value, 0)) @ direction.T / spread**2 + prior
+    telling = _by_blocks(weight * (seen[0] * slopes[0] + seen[1] * slopes[1]))
+    # Blocks of mere noise tell as much for the map as against it.
+    # Share of the blocks that must tell: what few of them tell may move on its own.
+    if telling.mean() <= np.sqrt(0.1 * (telling**2).mean()):
+        return Aligned(here, np.inf)
+    return Aligned(here, _error(slopes, weight * miss / spread**2, information))
+
+
+def _by_blocks(values: Floats32) -> Floats32:
+    """The means (12, 12) of an image over its blocks."""
+    blocks = cv2.resize(values, (PARTS, PARTS), interpolation=cv2.INTER_AREA)
+    return np.asarray(blocks, np.float32)
+
+
+def _slopes(view: Floats32) -> Floats32:
+    """By what each pixel changes with shift, turn, scale about the middle, and light, (6, h, w)."""
+    height, width = view.shape
+    u = np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2)
+    v = (np.arange(height, dtype=np.float32) - np.float32((height - 1) / 2))[:, None]
+    gu, gv = (0.5 * cv2.Sobel(view, cv2.CV_32F, *by, ksize=1) for by in ((1, 0), (0, 1)))
+    return np.stack([gu, gv, gu * u + gv * v, gv * u - gu * v, view, np.ones_like(view)])
+
+
+def _error(slopes: Floats32, pull: Floats32, information: Floats) -> float:
+    """Standard error of the places of a map, if errors within a block may be the same.
+
+    `pull` (h, w) of each pixel; what the pixels do not tell is known by the guess only.
+    """
+    height, width = (side // PARTS for side in pull.shape)
+    if not height or not width:
+        return np.inf
+    pulls = (slopes * pull)[:, : height * PARTS, : width * PARTS]
+    means = np.array([_by_blocks(by) for by in pulls], float).reshape(6, -1)
+    sums = height * width * means
+    covariance = np.linalg.inv(information)
+    blockwise = covariance @ (sums @ sums.T) @ covariance
+    variance = np.maximum(np.diag(blockwise), np.diag(covariance))
+    far = (pull.shape[0] ** 2 + pull.shape[1] ** 2 - 2) / 12  # mean square from the middle
+    return float(np.sqrt((variance[0] + variance[1] + far * (variance[2] + variance[3])) / 2))
+
+
+class CameraMotion(NamedTuple):
+    """Where each frame lies in the first one.
+
+    `maps` (n, 3, 3) take homogeneous pixels of a frame to pixels of the first; `errors` (n,) are
+    the standard errors of the places that they give, in pixels: infinite where nothing is known.
+    """
+
+    maps: Floats
+    errors: Floats
+
+    @classmethod
+    def of(cls, maps: Floats, errors: Floats, factor: int) -> CameraMotion:
+        """By maps of frames that are reduced by a factor, and errors in their pixels."""
+        larger = rescaled(maps, 1 / factor)
+        return cls(larger / larger[:, 2:, 2:], factor * errors)
+
+    @property
+    def moves(self) -> bool:
+        """Does the camera move at all?"""
+        return not np.array_equal(self.maps, np.broadcast_to(np.eye(3), self.maps.shape))
+
+
+def at_rest(n: int) -> CameraMotion:
+    """The motion of a camera that stands still."""
+    return CameraMotion(np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros(n))
+
+
+def rescaled(maps: Floats, factor: float) -> Floats:
+    """Maps (n, 3, 3) of pixels of an image as maps of those of the image reduced by a factor."""
+    larger = np.array([[factor, 0, (factor - 1) / 2], [0, factor, (factor - 1) / 2], [0, 0, 1]])
+    return np.asarray(np.linalg.inv(larger) @ maps @ larger, float)
+
+
+def stands_still(samples: Iterable[Image]) -> bool | None:
+    """Does no pair of reduced samples, successive or far apart, show that the camera moves?
+
+    It moves if clearly more corners share a motion than stay where they are. None if most pairs
+    are too plain to tell.
+    """
+    looks = [Look(sample) for sample in samples]
+    middle = looks[len(looks) // 2]
+    found = []
+    for before, after in [(looks[0], middle), (middle, looks[-1]), *pairwise(looks)]:
+        found.append(_moved(before, after))
+        if found[-1]:
+            return False
+    return True if 2 * found.count(None) < len(found) else None
+
+
+def _moved(before: Look, after: Look) -> bool | None:
+    a, b = before.follow(after, np.eye(3))
+    similar, _ = _similar(a, b, 2 * _STILL)
+    if similar is None:
+        return _drifted(before, after)
+    still = np.linalg.norm(b - a, axis=1) < _STILL
+    share = np.linalg.norm(carry(similar, a) - b, axis=1) < _STILL
+    moves = bool(still.sum() < 0.7 * share.sum())
+    # Corners that must share a motion, if it is to be the camera's.
+    few = share.sum() < max(10, moves * _AGREE * len(a))
+    # Those of one large thing are not spread over the image, by its own spread.
+    apart = 0.6 * np.linalg.norm(before.grey.shape) / np.sqrt(12)
+    if few or (moves and np.sqrt(a[share].var(axis=0).sum()) <= apart):
+        return _drifted(before, after)
+    return moves
+
+
+def _drifted(before: Look, after: Look) -> bool | None:
+    """Do all pixels tell of a motion, where corners are few? None if these are mute, too."""
+    found = align(before.grounds, after.levels, np.eye(3))
+    if found is None or found.error > _VAGUE:
+        return None
+    moved = displacement(found.map[None], before.grey.shape[::-1])[0]
+    return bool(moved > PLAINLY / 2 * found.error)
+
+
+def displacement(maps: Floats, size: Sequence[int]) -> Floats:
+    """Pixels by which maps (n, 3, 3) move an image (width, height), rms of its parts."""
+    grid = np.array([[u, v] for u in (0.2, 0.5, 0.8) for v in (0.2, 0.5, 0.8)])
+    points = grid * np.array(size)
+    return np.array([np.sqrt(np.mean(np.sum((carry(h, points) - points) ** 2, 1))) for h in maps])
+
+
+def _similar(a: Floats, b: Floats, exact: float) -> tuple[Floats | None, Bools]:
+    """The shift, turn and scale that most corners share, and which do."""
+    # Corners for a map of four numbers.
+    if len(a) >= 8:
+        found, obey = cv2.estimateAffinePartial2D(a, b, ransacReprojThreshold=exact)
+        if found is not None:
+            return np.vstack([found, [0, 0, 1]]), obey[:, 0] > 0
+    return None, np.zeros(len(a), bool)
+
+
+def _by_corners(before: Look, after: Look, last: Floats) -> tuple[Aligned | None, bool]:
+    """Where a frame lies in another, by its corners, from a map that is about right.
+
+    And whether they need no other witness: they are many, and tell the map exactly.
+    """
+    a, b = before.follow(after, last)
+    best, good = _similar(a, b, 2 * LOOSE)
+    if best is None or good.sum() < max(20, _AGREE * len(a)):  # fewer are not worth a look
+        return None, False
+    if good.sum() >= _MANY:
+        full, obey = cv2.findHomography(a, b, cv2.RANSAC, LOOSE)
+        if full is not None and obey.sum() >= max(_MANY, 0.8 * good.sum()):
+            best, good = np.asarray(full, float), obey[:, 0] > 0
+    miss = np.linalg.norm(carry(best, a[good]) - b[good], axis=1)
+    error = float(np.sqrt(np.mean(miss**2) * 4 / len(miss)))
+    # Reduced pixels: corners that tell a map no better need another witness, too.
+    return Aligned(best, error), len(miss) >= _MANY and error < 0.05
+
+
+class _Key(NamedTuple):
+    """A frame in which others are located, and where it lies in the first one."""
+
+    look: Look
+    base: Floats
+    error: float
+
+    def locate(self, look: Look, last: Floats) -> Aligned | None:
+        """Where it lies in another, from a map that is about right.
+
+        By corners; if these are few, perhaps by pixels.
+        """
+        told, alone = _by_corners(self.look, look, last)
+        if alone:
+            return told
+        direct = align(self.look.grounds, look.levels, last)
+        both = [one for one in (told, direct) if one is not None and one.error < _VAGUE]
+        best = min((one.error for one in both), default=0.0)
+        # Times the error of another map that is about as good; then the smaller step is taken.
+        good = [one for one in both if one.error <= 3.0 * best]
+        size, back = self.look.grey.shape[::-1], np.linalg.inv(last)
+        steps = [displacement((one.map @ back)[None], size)[0] for one in good]
+        return good[int(np.argmin(steps))] if good else None
+
+    def shared(self, here: Floats) -> float:
+        """Share of it that is in the view of the frame in which it lies here."""
+        size = np.array(self.look.grey.shape[::-1])
+        u, v = np.meshgrid(*np.outer(size, np.linspace(0, 1, 9)))
+        places = carry(here, np.column_stack([u.ravel(), v.ravel()]))
+        return float(((places >= 0) & (places < size)).all(axis=1).mean())
+
+
+def steadied(frames: Iterable[Image], factor: int) -> CameraMotion:
+    """The motion of a camera, by frames reduced by a factor, one after the other."""
+    maps: list[Floats] = []
+    errors: list[float] = []
+    located: Aligned | None
+    for look in map(Look, frames):
+        if not maps:
+            key = before = _Key(look, np.eye(3), 0.0)
+            last, located = np.eye(3), Aligned(np.eye(3), 0.0)
+        elif (located := key.locate(look, last)) is None:
+            # Little in common with the key frame: more with the last one known.
+            key, last = before, np.eye(3)
+            located = key.locate(look, last)
+        if located is None:
+            maps.append(maps[-1])
+            errors.append(np.inf)
+            continue
+        last = located.map
+        error = float(np.hypot(key.error, located.error))
+        before = _Key(look, key.base @ np.linalg.inv(last), error)
+        maps.append(before.base)
+        errors.append(error)
+        # Share of a key frame that is left, below which there must be a new one. Each adds its
+        # error to all that follow, so late: a little above the 0.3 that `align` needs.
+        if key.shared(last) < 0.4:
+            key, last = before, np.eye(3)
+    return CameraMotion.of(np.array(maps), np.array(errors), factor)
 
 
 def explains(samples: Image, maps: Floats, known: Bools) -> bool:
@@ -57,13 +457,8 @@ def explains(samples: Image, maps: Floats, known: Bools) -> bool:
     apart = np.array([displacement(np.linalg.inv(usual) @ maps, size) for usual in maps])
     weights = apart[apart.sum(axis=1).argmin()]
     all_known = np.ones(len(maps), bool)
-    plates = Plate(samples, maps, all_known), Plate(samples, rest, all_known)
-    gains = [
-        _gain(
-            *(_misses(sample, *plate.seen_from(at)) for plate, at in zip(plates, both, strict=True))
-        )
-        for sample, *both in zip(samples, maps, rest, strict=True)
-    ]
+    moved, rested = (_missed(samples, Plate(samples, at, all_known), at) for at in (maps, rest))
+    gains = [_gain(*both) for both in zip(moved, rested, strict=True)]
     # Of a gain: the noise of a median of 21 frames adds that, and maps smooth it.
     return bool(weights @ gains > 0.04 * weights.sum())
 
@@ -74,17 +469,21 @@ def rests(samples: Image) -> bool:
     Not so if it moves, nor if there is too little to see.
     """
     rest = np.broadcast_to(np.eye(3), (len(samples), 3, 3))
-    plate = Plate(samples, rest, np.ones(len(samples), bool)).image
-    sides = [np.array([[1, 0, u], [0, 1, v]], float) for u, v in ((1, 0), (-1, 0), (0, 1), (0, -1))]
-    size, everywhere = plate.shape[1::-1], np.ones(plate.shape[:2], bool)
-    beside = [cv2.warpAffine(plate, side, size, borderMode=cv2.BORDER_REPLICATE) for side in sides]
-    least = []
-    for sample in samples:
-        here = _misses(sample, plate, everywhere)
-        off = [_misses(sample, np.asarray(one, np.uint8), everywhere) for one in beside]
-        least.append(min(_gain(here, there) for there in off))
+    plate = Plate(samples, rest, np.ones(len(samples), bool))
+    here, *beside = (
+        _missed(samples, plate, rest + np.array([[0, 0, u], [0, 0, v], [0, 0, 0]]))
+        for u, v in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
+    )
+    least = [
+        min(_gain(one, other) for other in off) for one, *off in zip(here, *beside, strict=True)
+    ]
     # Share of the frames that say so, if the camera is at rest.
     return bool(np.mean(np.array(least) > 0) >= 0.9)
+
+
+def _missed(samples: Image, plate: Plate, maps: Floats) -> list[Floats32]:
+    """What each sample misses of a plate that lies in it by these maps, see `_misses`."""
+    return [_misses(one, *plate.seen_from(at)) for one, at in zip(samples, maps, strict=True)]
 
 
 def _misses(frame: Image, ground: Image, known: Bools) -> Floats32:
@@ -119,16 +518,17 @@ def _gain(one: Floats32, other: Floats32) -> float:
 
 def trembling(frames: Reel, samples: Image) -> CameraMotion | None:
     """The motion of a camera that trembles, None if that is not sure; `samples` are reduced."""
-    views = [pyramid(sample) for sample in samples]
+    views = [Look(sample).levels for sample in samples]
     maps = np.tile(np.eye(3), (len(samples), 1, 1))
     # Each of the samples as they were laid on the one before.
     for _ in range(2):
-        ground = _ground(Plate(samples, maps, np.ones(len(samples), bool)))
+        image, known = Plate(samples, maps, np.ones(len(samples), bool)).seen_from(np.eye(3))
+        ground = [_limited(level, known) for level in Look(image).grounds]
         laid = [_laid(ground, view, here) for view, here in zip(views, maps, strict=True)]
         # Reduced pixels to which a motion must be known.
         if np.median([one.error for one in laid]) > 0.5:
             return None
-        maps = _maps(laid)
+        maps[:] = np.linalg.inv([one.map for one in laid])
         # Reduced pixels: what moves farther blurs the first plate too much.
         if displacement(maps, samples.shape[2:0:-1]).max() > 8.0:
             return None
@@ -137,13 +537,13 @@ def trembling(frames: Reel, samples: Image) -> CameraMotion | None:
     if alike < 0.5:
         return None
     usual = np.sqrt(np.mean([one.error**2 for one in laid if np.isfinite(one.error)]))
-    return _motion(ground, frames, max(error / usual, 1.0))
-
-
-def _ground(plate: Plate) -> list[Ground]:
-    """A plate as the first frame shows it, to lay others on."""
-    image, known = plate.seen_from(np.eye(3))
-    return [_limited(level, known) for level in grounds(pyramid(image))]
+    # All frames laid on the ground, and so on the first; errors are larger than pixels tell.
+    laid = [_laid(ground, Look(frame).levels, np.eye(3)) for frame in frames]
+    places = np.asarray(np.linalg.inv([one.map for one in laid]), float)
+    errors = np.array([one.error for one in laid])
+    sure = max(error / usual, 1.0) * np.hypot(errors, errors[0])
+    sure[0] = 0.0
+    return CameraMotion.of(np.linalg.inv(places[0]) @ places, sure, frames.factor)
 
 
 def _limited(level: Ground, where: Bools) -> Ground:
@@ -158,11 +558,6 @@ def _laid(ground: list[Ground], view: list[Floats32], here: Floats) -> Aligned:
     """The map of the ground to a view, from one the other way round that is about right."""
     back = np.asarray(np.linalg.inv(here), float)
     return align(ground, view, back) or Aligned(back, np.inf)
-
-
-def _maps(laid: Sequence[Aligned]) -> Floats:
-    """Where views lie on the ground, (n, 3, 3)."""
-    return np.asarray(np.linalg.inv([one.map for one in laid]), float)
 
 
 def _halves(
@@ -188,15 +583,6 @@ def _halves(
     return float(alike), float(np.sqrt(np.mean((one - other) ** 2)) / 2)
 
 
-def _motion(ground: list[Ground], frames: Reel, larger: float) -> CameraMotion:
-    """All frames laid on the ground, and so on the first; errors are `larger` than they tell."""
-    laid = [_laid(ground, pyramid(frame), np.eye(3)) for frame in frames]
-    maps, errors = _maps(laid), np.array([one.error for one in laid])
-    sure = larger * np.hypot(errors, errors[0])
-    sure[0] = 0.0
-    return CameraMotion.of(np.linalg.inv(maps[0]) @ maps, sure, frames.factor)
-
-
 def camera_motion(frames: Reel, small: Image, sampled: Ints) -> tuple[CameraMotion, bool]:
     """The camera's motion, and whether that is sure.
 
@@ -220,19 +606,11 @@ def _followed(frames: Reel, small: Image, sampled: Ints) -> CameraMotion | None:
     frames fit together worse by them than at rest.
     """
     motion = steadied(frames, frames.factor)
-    if not _plainly(motion, frames.info.size, frames.factor):
+    errors = motion.errors[1:]
+    sure = displacement(motion.maps[1:], frames.info.size) / np.maximum(errors, 1e-3)
+    # The last of the frames show it if the camera moves at all.
+    if np.median(errors) >= frames.factor * LOOSE or np.quantile(sure, 0.95) <= PLAINLY:
         return None
     at = np.minimum(sampled, len(motion.maps) - 1)
     known = np.isfinite(motion.errors[at])
     return motion if explains(small, rescaled(motion.maps[at], frames.factor), known) else None
-
-
-def _plainly(motion: CameraMotion, size: tuple[int, int], factor: int) -> bool:
-    """Does a camera move by far more than the errors of its maps, and are these small?"""
-    told = motion.errors[1:] < factor * LOOSE
-    # Share of the frames that tell of the camera's motion, if it is known.
-    if told.mean() < 0.5:
-        return False
-    sure = displacement(motion.maps[1:], size) / np.maximum(motion.errors[1:], 1e-3)
-    # Of the frames, the last of which show it if the camera moves at all.
-    return bool(np.quantile(sure, 0.95) > PLAINLY)

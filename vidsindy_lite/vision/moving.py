@@ -10,32 +10,47 @@
   refining      its places to a fraction of a pixel, in whole frames; doubts
 
 Somebody who points at the target in one frame decides where its looks are learned.
+
+Where two meet in an image, nobody can say which is which afterwards: who is who, across meetings
+and views, is for the cameras to tell (`cameras.identify`). So a track is that of one target from
+one meeting to the next.
 """
 
+import os
 from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
 from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import sampled
-from .camera import LOOSE, camera_motion
+from ..checks import check_integer
+from .background import (
+    LONGEST,
+    BackgroundModel,
+    Plate,
+    carry,
+    lights_of,
+    noise_of,
+    sample_frames,
+    sampled,
+)
+from .camera import LOOSE, CameraMotion, at_rest, camera_motion, rescaled
 from .candidates import (
     TOLD,
     Candidates,
+    Hint,
     Looks,
-    Path,
+    Motion,
     best_path,
     candidates,
     followed,
     plainest_paths,
     uncommon,
 )
-from .hints import Hint
-from .plate import Plate, lights_of, noise_of
 from .refining import Lens, View, entire, fitting, hidden, roughness, swapped
-from .steadying import CameraMotion, at_rest, carry, rescaled
 from .video import Reel, reduce
 
 _SHORTEST = 5  # frames of a path
@@ -203,7 +218,7 @@ def sighted(
 
 def _paths(
     seen: Candidates, hint: Hint | None, seed: tuple[int, Floats, Floats] | None
-) -> list[Path]:
+) -> list[Motion]:
     """The plainest paths, of what a hint allows."""
     if seed is not None:
         frame, centre, size = seed
@@ -213,7 +228,7 @@ def _paths(
         if not (here & near & alike).any():
             return []
         quality = np.where(here, np.where(near & alike, seen.quality + TOLD, -TOLD), seen.quality)
-        return [Path(best_path(seen._replace(quality=quality))[0], np.inf)]
+        return [Motion(best_path(seen._replace(quality=quality))[0], np.inf)]
     liked = seen
     if hint is not None and hint.colour is not None:
         liked = seen._replace(quality=seen.quality * hint.likeness(seen.colour, seen.behind))
@@ -372,16 +387,22 @@ def _confidence(errors: Floats | float) -> Floats:
     return np.asarray(np.exp(-np.asarray(errors) / 3))
 
 
-def _doubts(film: Film, seen: Candidates, paths: list[Path], hint: Hint | None) -> tuple[str, ...]:
+def _spot(film: Film, seen: Candidates, path: Motion) -> str:
+    """Where somebody may look at what moves along a path."""
+    row = path.rows[len(path.rows) // 2]
+    u, v = film.factor * seen.centre[row]
+    return f"e.g. in frame {seen.frame[row]} at ({u:.0f}, {v:.0f})"
+
+
+def _doubts(
+    film: Film, seen: Candidates, paths: list[Motion], hint: Hint | None
+) -> tuple[str, ...]:
     """What else moves about as plainly, and whether the camera is known."""
     doubts: tuple[str, ...] = ()
     others = [p for p in paths[1:] if p.rating > 0.5 * paths[0].rating]
     if others and hint is None:
-        row = others[0].rows[len(others[0].rows) // 2]
-        u, v = film.factor * seen.centre[row]
-        doubts += (f"something else moves about as plainly, e.g. in frame {seen.frame[row]} at "
-                   f"({u:.0f}, {v:.0f}): if that is the target, say so, "
-                   "target=Hint(frame=, box=)",)  # fmt: skip
+        doubts += (f"something else moves about as plainly, {_spot(film, seen, others[0])}: if "
+                   "that is the target, say so, target=Hint(frame=, box=)",)  # fmt: skip
     if not film.sure:
         doubts += ("the background is too plain to tell whether the camera moves: if so, its "
                    "motion is part of the track",)  # fmt: skip
@@ -512,3 +533,102 @@ def _filled(
     if not len(at) and np.isfinite(pixels[:, 0]).any():
         return replace(found, pixels=pixels, confidence=confidence, warnings=(_LOOKS_ALONE,))
     return replace(found, pixels=pixels, confidence=confidence)
+
+
+def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
+    """Track so many moving targets of a video, each where it is apart from the others.
+
+    Parameters
+    ----------
+    path : path
+        A video in which nothing else moves as plainly.
+    count : int
+        How many targets there are.
+
+    Returns
+    -------
+    tuple of Track
+        NaN wherever two targets meet. Behind a meeting a track may be that of another target. If
+        fewer things move, the last tracks are NaN throughout.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        If the file is missing or no video.
+    """
+    check_integer("count", count, least=1)
+    frames = Reel(path, LONGEST)
+    samples = sample_frames(frames)
+    # Before a plain background, all that could tell of a camera's motion may be the targets.
+    film = Film.of(frames, samples, BackgroundModel(samples).camera_rests)
+    seen, lights = sighted(film, targets=count)
+    n = len(lights)
+    # Paths of a target that may follow each other.
+    paths = plainest_paths(seen, most=count * 8)
+    lanes, strange = _lanes(seen, paths, count)
+    ways = [_joined([expected(seen, p.rows, film, n) for p in lane]) for lane in lanes]
+    touching = _touching(ways)
+    # One that is not seen may be in one with any of the others.
+    lost = np.ones((len(lanes), n), bool)
+    for missed, lane in zip(lost, lanes, strict=True):
+        missed[seen.frame[np.concatenate([path.rows for path in lane])]] = False
+    longest = max(strange, key=lambda path: len(path.rows), default=None)
+    doubts: tuple[str, ...] = ()
+    # Share of the frames in which one more thing moves, above which there is doubt.
+    if longest is not None and len(longest.rows) >= 0.2 * n:
+        doubts = (f"{Path(path).name}: one thing more moves than there are targets, "
+                  f"{_spot(film, seen, longest)}",)  # fmt: skip
+    tracks = []
+    lens = lens_of(samples, film, *ways)
+    for way, met, missed in zip(ways, touching, lost, strict=True):
+        apart = np.asarray(lost.sum(axis=0) == missed)
+        way.centre[met] = np.nan
+        tracks.append(finished(viewed(film, lens, way, lights), film.motion, doubts, apart))
+        doubts = ()
+    return (*tracks, *[nothing(film.motion, n)] * (count - len(tracks)))
+
+
+def _lanes(
+    seen: Candidates, paths: list[Motion], count: int
+) -> tuple[list[list[Motion]], list[Motion]]:
+    """The paths of each target, one after the other in time; and paths for which none is left."""
+    lanes: list[list[Motion]] = []
+    left = []
+    plainest = max((path.rating / len(path.rows) for path in paths), default=0.0)
+    taken = np.zeros((count, 1 + seen.frame.max(initial=0)), bool)
+    for path in sorted(paths, key=lambda path: -len(path.rows)):
+        # Worth of a candidate of a path, relative to those of the plainest.
+        if path.rating / len(path.rows) < 0.4 * plainest:
+            continue
+        first, last = seen.frame[path.rows[[0, -1]]]
+        free = np.flatnonzero(~taken[:, first : last + 1].any(axis=1))
+        if not len(free):
+            left.append(path)
+            continue
+        taken[free[0], first : last + 1] = True
+        if free[0] == len(lanes):
+            lanes.append([])
+        lanes[free[0]].append(path)
+    return lanes, left
+
+
+def _joined(ways: list[Ways]) -> Ways:
+    """The ways of paths that follow each other as one."""
+    whole, *others = ways
+    for way in others:
+        free = np.isnan(whole.centre[:, :1])
+        whole = Ways(*(np.where(free, b, a) for a, b in zip(whole, way, strict=True)))
+    return whole
+
+
+def _touching(ways: list[Ways]) -> list[Bools]:
+    """In which frames each target touches another one, or hides it."""
+    found = [np.zeros(len(ways[0].centre), bool) for _ in ways]
+    for (i, one), (j, other) in combinations(enumerate(ways), 2):
+        apart = np.linalg.norm(one.centre - other.centre, axis=1)
+        sizes = (one.box[:, 2:].max(axis=1) + other.box[:, 2:].max(axis=1)) / 2
+        # Sizes, and pixels more, between two targets that do not touch.
+        met = apart < 1.3 * sizes + 2.0
+        found[i] |= met
+        found[j] |= met
+    return found

@@ -1,18 +1,33 @@
 """The package's own network, in PyTorch: fully convolutional, anchor-free, one class.
 
 Of the family of YOLO-v8, with decoupled heads for *what* (the confidence) and *where* (centre and
-size). Only this module and `training` import torch.
+size). Only this module imports torch.
+
+It is trained from scratch, on frames that the package renders: every step draws its frames and
+augmentations from the seed and its own number.
 """
 
+import io
+import json
+import os
+import platform
+from typing import Any
+
+import cv2
 import numpy as np
 import torch
 from torch import nn
-from torch.nn.utils.fusion import fuse_conv_bn_eval
+from torch.nn import functional
+from torch.optim import lr_scheduler
+from tqdm import trange
 
-from ..arrays import Image
+from ..arrays import Floats, Floats32, Image
+from ..checks import check_integer, check_path
+from ..storage import write_file
+from .rendering import BACKGROUNDS, COLOURS, Box, LabelledFrame, Scene, draw_frames
+from .tracking import WEIGHTS
 
 STRIDE = 4  # pixels between two anchors
-COARSEST = 16  # pixels, of which the sides of an image are multiples
 
 
 class _Conv(nn.Sequential):
@@ -102,12 +117,241 @@ def as_input(images: Image) -> torch.Tensor:
     return planes.float().div_(255)  # permuted, the channels stay last in memory: the fast order
 
 
-def fused(module: Network) -> Network:
-    """Fold each batch normalisation into the convolution before it: the same values, faster."""
-    for child in module.modules():
-        if isinstance(child, _Conv):
-            convolution, normalisation, _ = child
-            assert isinstance(convolution, nn.Conv2d)
-            assert isinstance(normalisation, nn.BatchNorm2d)
-            child[0], child[1] = fuse_conv_bn_eval(convolution, normalisation), nn.Identity()
-    return module
+SEEN_BACKGROUNDS = ("plain", "sky", "hills", "wood")
+SEEN_SHAPES = ("disc", "polygon")
+"""What the detector is trained on. The other backgrounds and shapes are kept to test it."""
+STEPS = 2000
+BATCH = 16
+SIDE = 96  # pixels; width and height of a training frame
+
+_POOLED = 512  # pixels; width and height of the backgrounds that frames are cut from
+_EACH = 12  # such backgrounds of each kind
+
+# ------------------------------------------------------------------------------------------ frames
+
+
+def training_frame(rng: np.random.Generator, pool: Image) -> tuple[LabelledFrame, Floats]:
+    """One random frame, its labels, and the centroid of the target, (2,), NaN without target.
+
+    Scenes, colours and occluders are random, targets stretched, frames disturbed as by a camera.
+
+    Parameters
+    ----------
+    rng : np.random.Generator
+    pool : ndarray
+        As of `background_pool`.
+    """
+    occluders = tuple(_rectangle(rng) for _ in range(rng.choice(3, p=(0.5, 0.25, 0.25))))
+    scene = Scene(
+        background=str(rng.choice(SEEN_BACKGROUNDS)),
+        shape=str(rng.choice(SEEN_SHAPES)),
+        size=float(np.exp(rng.uniform(np.log(5), np.log(80)))),
+        colour=str(rng.choice(list(COLOURS))),
+        noise_variance=float(rng.choice(2) * rng.uniform(0, 0.015)),
+        occluders=occluders,
+        shape_seed=int(rng.integers(2**31)),
+        image_size=(SIDE, SIDE),
+    )
+    centre = rng.uniform(-0.5, SIDE - 0.5, 2)
+    if rng.random() < 0.15:  # without a target
+        centre = np.full(2, np.nan)
+    elif occluders and rng.random() < 0.5:  # near an edge of an occluder, where it is hard
+        box = np.array(occluders[-1])
+        centre = box[:2] + rng.uniform(-0.3, 1.3, 2) * box[2:]
+    stretch = np.exp(rng.uniform(-0.35, 0.35) * np.array([1, -1]))
+    angle = rng.uniform(0, np.pi)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    shape = turn * stretch @ turn.T
+    seed, scenery = int(rng.integers(2**31)), _scenery(rng, pool)
+    drawn = next(draw_frames(centre[None], scene, seed, shape[None], scenery))
+    return drawn._replace(frame=_seen_by_a_camera(drawn.frame, rng)), centre
+
+
+def _rectangle(rng: np.random.Generator) -> Box:
+    """Left, top, width and height of a post or a hedge."""
+    size = rng.integers((8, 24), (60, SIDE))
+    size = size if rng.random() < 0.5 else size[::-1]
+    left, top = (int(rng.integers(0, SIDE - s + 1)) for s in size)
+    return left, top, int(size[0]), int(size[1])
+
+
+def background_pool(rng: np.random.Generator) -> Image:
+    """Backgrounds to cut training frames from, (m, 512, 512, 3) uint8."""
+    size = (_POOLED, _POOLED)
+    return np.stack([BACKGROUNDS[kind](rng, size) for kind in SEEN_BACKGROUNDS * _EACH])
+
+
+def _scenery(rng: np.random.Generator, pool: Image) -> Image:
+    """A patchwork of backgrounds at several scales and in unlike colours, (SIDE, SIDE, 3)."""
+    image = _background(rng, pool)
+    for _ in range(rng.choice(4, p=(0.55, 0.15, 0.15, 0.15))):
+        if rng.random() < 0.5:
+            left, top, width, height = _rectangle(rng)
+            part = np.s_[top : top + height, left : left + width]
+            image[part] = _background(rng, pool)[part]
+        else:
+            image = np.asarray(cv2.add(image, _tiles(rng), dtype=cv2.CV_8U), np.uint8)
+    return image
+
+
+def _background(rng: np.random.Generator, pool: Image) -> Image:
+    """A piece of a background, sometimes magnified or reduced, in colours of its own."""
+    size = round(SIDE * np.exp(rng.uniform(np.log(0.5), np.log(_POOLED / SIDE))))
+    left, top = rng.integers(0, _POOLED - size + 1, 2)
+    image = pool[rng.integers(len(pool))][top : top + size, left : left + size]
+    resized = cv2.resize(image, (SIDE, SIDE), interpolation=cv2.INTER_AREA)
+    # Its colours are mixed, muted: the target's are the vivid ones.
+    mix = np.eye(3) + rng.uniform(-0.25, 0.25, (3, 3))[::-1, ::-1]  # as the shipped weights saw it
+    mix *= rng.uniform(0.6, 1.3) / mix.sum(axis=1, keepdims=True)
+    return np.asarray(cv2.transform(resized, mix.astype(np.float32)), np.uint8)
+
+
+def _tiles(rng: np.random.Generator) -> Floats32:
+    """Brightness of tiles: a grid of random pitch, turned at random, (SIDE, SIDE, 3)."""
+    v, u = np.mgrid[:SIDE, :SIDE].astype(np.float32)
+    angle = rng.uniform(0, np.pi)
+    across, along = np.array([np.cos(angle), np.sin(angle)], np.float32)
+    rows = ((u * across + v * along) / np.float32(rng.uniform(8, 60))).astype(int)
+    columns = ((v * across - u * along) / np.float32(rng.uniform(8, 60))).astype(int)
+    light = rng.uniform(-40, 40, (SIDE, SIDE)).astype(np.float32)[rows % SIDE, columns % SIDE]
+    return np.stack([light] * 3, axis=-1)
+
+
+def _seen_by_a_camera(frame: Image, rng: np.random.Generator) -> Image:
+    """Another white balance, colours exchanged, blur, or a lossy codec."""
+    frame = frame[..., ::-1]  # OpenCV's order, whose codec it is
+    frame = frame[..., rng.permutation(3)] if rng.random() < 0.5 else frame
+    if rng.random() < 0.1:
+        frame = np.stack([cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY)] * 3, axis=-1)
+    gain = rng.uniform(0.8, 1.2) * rng.uniform(0.9, 1.1, 3)
+    frame = np.clip(frame * gain + rng.uniform(-15, 15), 0, 255).astype(np.uint8)
+    if rng.random() < 0.2:
+        frame = np.asarray(cv2.GaussianBlur(frame, (0, 0), rng.uniform(0.4, 1.2)), np.uint8)
+    if rng.random() < 0.15:
+        quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(40, 95))]
+        coded = cv2.imencode(".jpg", frame, quality)[1]
+        frame = np.asarray(cv2.imdecode(coded, cv2.IMREAD_COLOR), np.uint8)
+    return np.ascontiguousarray(frame[..., ::-1])
+
+
+# -------------------------------------------------------------------------------------------- loss
+
+
+def detection_loss(
+    predictions: torch.Tensor, centres: torch.Tensor, sizes: torch.Tensor, presence: torch.Tensor
+) -> torch.Tensor:
+    """Quality focal loss of the confidence, plus the errors of centre and size where it matters.
+
+    Parameters
+    ----------
+    predictions : tensor, shape (b, 5, n)
+        As of `Network`, of square images.
+    centres, sizes : tensor, shape (b, 2)
+        Pixels; anything where there is no target.
+    presence : tensor, shape (b,)
+        1 for a target that is seen whole, 0 for none.
+
+    Returns
+    -------
+    loss : tensor, scalar
+    """
+    side = round(predictions.shape[2] ** 0.5)
+    squared = (anchors(side, side)[None] - centres[:, None]).square().sum(dim=2)
+    spread = (0.2 * sizes.mean(dim=1)).clamp(min=STRIDE)[:, None]
+    # Among the anchors around a target the nearest is to be sure of it, the others less.
+    nearest = squared.amin(dim=1, keepdim=True)
+    quality = presence[:, None] * torch.exp((nearest - squared) / (2 * spread**2))
+    logit = predictions[:, 4]
+    entropy = functional.binary_cross_entropy_with_logits(logit, quality, reduction="none")
+    what = ((quality - logit.sigmoid()).square() * entropy).sum()
+    weight = torch.where(quality > 0.2, quality, 0)
+    off = (predictions[:, :2] - centres[:, :, None]).abs().sum(dim=1) / STRIDE
+    stretch = (predictions[:, 2:4] / sizes[:, :, None]).log().abs().sum(dim=1)
+    where = (weight * (off + 0.5 * stretch)).sum()
+    return what / quality.sum().clamp(min=1) + where / weight.sum().clamp(min=1)
+
+
+def _batch(seed: int, step: int, pool: Image) -> tuple[torch.Tensor, ...]:
+    """Images and labels of one step."""
+    rngs = [np.random.default_rng(s) for s in np.random.SeedSequence((seed, step)).spawn(BATCH)]
+    frames, centres = zip(*(training_frame(rng, pool) for rng in rngs), strict=True)
+    images = as_input(np.stack([drawn.frame for drawn in frames]))
+    visible = np.array([drawn.visible for drawn in frames])
+    # Seen to 0.95 it is a target, to 0.6 it is none.
+    presence = np.clip((visible - 0.6) / (0.95 - 0.6), 0, 1)
+    sizes = np.nan_to_num([drawn.extent for drawn in frames], nan=1.0)
+    labels = (np.nan_to_num(centres), sizes, presence)
+    return images, *(torch.as_tensor(label, dtype=torch.float32) for label in labels)
+
+
+# -------------------------------------------------------------------------------------------- loop
+
+
+def train(
+    weights: str | os.PathLike = WEIGHTS, seed: int = 0, steps: int = STEPS
+) -> dict[str, Any]:
+    """Train the detector and write its weights, with the log of the training beside them.
+
+    It takes a few minutes, and a terminal shows how far it is.
+
+    Parameters
+    ----------
+    weights : path
+        File for the weights (.pt); the log is a .json of the same name.
+    seed : int
+    steps : int
+        Batches of 16 frames.
+
+    Returns
+    -------
+    log : dict
+        Seed, numbers of steps, frames and parameters, loss curve, what was trained on, versions.
+    """
+    weights = check_path("weights", weights)
+    seed, steps = check_integer("seed", seed), check_integer("steps", steps, 1)
+    with torch.random.fork_rng():
+        torch.manual_seed(seed)
+        network = Network().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    optimiser = torch.optim.AdamW(network.parameters(), weight_decay=1e-3)
+    # The largest learning rate, to which it rises over a twentieth of the steps.
+    schedule = lr_scheduler.OneCycleLR(optimiser, 3e-3, steps + 1, pct_start=0.05)
+    pool = background_pool(np.random.default_rng(seed))
+    losses: list[float] = []
+    for step in trange(steps, unit="step", disable=None):
+        images, *labels = _batch(seed, step, pool)
+        loss = detection_loss(network(images), *labels)
+        optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
+        optimiser.step()
+        schedule.step()
+        losses.append(loss.item())
+    memory = io.BytesIO()
+    torch.save(network.state_dict(), memory)
+    write_file(weights, memory.getvalue())
+    log = _training_log(seed, losses, sum(p.numel() for p in network.parameters()))
+    write_file(weights.with_suffix(".json"), (json.dumps(log, indent=1) + "\n").encode())
+    return log
+
+
+def _training_log(seed: int, losses: list[float], parameters: int) -> dict[str, Any]:
+    """What the training was, as it goes into a JSON file."""
+    block = max(len(losses) // 100, 1)  # of as many points the curve is
+    means = [np.mean(losses[i : i + block]) for i in range(0, len(losses), block)]
+    return {
+        "seed": seed,
+        "steps": len(losses),
+        "frames": len(losses) * BATCH,
+        "frame_size": [SIDE, SIDE],
+        "backgrounds": list(SEEN_BACKGROUNDS),
+        "shapes": list(SEEN_SHAPES),
+        "parameters": parameters,
+        "steps_per_loss": block,
+        "loss": [round(float(mean), 4) for mean in means],
+        "versions": {
+            "python": platform.python_version(),
+            "torch": torch.__version__,
+            "numpy": np.__version__,
+            "opencv": cv2.__version__,
+        },
+    }

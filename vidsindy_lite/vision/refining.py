@@ -21,15 +21,13 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import dot, hull, lengths, relit, shadowed
-from .plate import Plate, least_difference, tolerance
+from .background import Plate, dot, hull, least_difference, lengths, relit, shadowed, tolerance
 
 _CELLS = 32  # into which the side of a target is cut
 _REACH = 1.5  # sides of the target from its middle that its usual outline may have
 _UNEVEN = 0.12  # share by which a shadow may darken the colours of a pixel unlike each other
 _WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
 _AROUND = 9  # views around one that say how large it should be
-_LONG = 31  # views around one that say how large it usually is
 _MOSTLY = 0.8  # share of the views that must show it whole
 _JOINED = 2.0  # factor by which the area grows at once where a target meets something like it
 _BESIDE = 5  # views before and after such a meeting, which show how large it was and is
@@ -140,14 +138,9 @@ class Lens:
         self.blur = 1.0 if noise > 2 else 0.6
 
     def look(
-        self,
-        frame: Image,
-        here: Floats,
-        box: Floats,
-        centre: Floats,
-        colour: Floats,
+        self, frame: Image, here: Floats, box: Floats, centre: Floats, colour: Floats,
         gain: Floats32,
-    ) -> View | None:
+    ) -> View | None:  # fmt: skip
         """The target near a box (left, top, width, height) around `centre`, if it is there."""
         # By half of its size and eight pixels a window exceeds the target.
         spare = 0.5 * box[2:].max() + 8
@@ -259,8 +252,7 @@ def entire(views: Sequence[View | None]) -> tuple[list[View | None], tuple[str, 
     if not turns or np.median(areas[:, 0] / areas[:, 1]) > 0.9:
         return parts, ()
     size = np.log(areas[:, 1])
-    # Factor by which its area differs from those around it at most, if it is whole.
-    keeps = np.abs(size - median_filter(size, _AROUND)) < np.log(1.5)
+    keeps = np.abs(size - median_filter(size, _AROUND)) < np.log(_WHOLE)
     if keeps.mean() > _MOSTLY:
         return [one and (one.whole or one) for one in views], ()
     return parts, ("the target has several colours, or touches other things: perhaps only a part "
@@ -277,7 +269,8 @@ def _usual_ones(views: Sequence[View | None]) -> list[View | None]:
     shown = np.flatnonzero(areas[:, 0] > 0)
     if not len(shown):
         return [None] * len(views)
-    usual = np.interp(np.arange(len(views)), shown, median_filter(areas[shown, 0], _LONG))
+    # Views around one say how large it usually is.
+    usual = np.interp(np.arange(len(views)), shown, median_filter(areas[shown, 0], 31))
     off = np.abs(np.log(np.maximum(areas, 1e-3) / usual[:, None]))
     # Areas of whole views scatter by less.
     better = off[:, 1] < np.minimum(off[:, 0], np.log(1.15))
@@ -372,9 +365,8 @@ def _leave_out(
     t = frames[others] - frames[i]
     if len(others) < 4 or max(t[-1], 0) - min(t[0], 0) > 15:
         return 0.0, np.inf
-    basis = np.vander(t / 3, min(5, len(others)))
     quartic, parabola = (
-        np.linalg.lstsq(powers, places[others])[0][-1] for powers in (basis, basis[:, -3:])
+        np.polyfit(t, places[others], degree)[-1] for degree in (min(4, len(t) - 1), 2)
     )
     off, unsure = np.linalg.norm([quartic - places[i], quartic - parabola], axis=1)
     beyond = t.min() > 0 or t.max() < 0

@@ -33,21 +33,24 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from ..arrays import Bools, Floats
 from ..storage import check_file, read_text, reading
 
-SUFFIXES = frozenset({".csv", ".tsv", ".txt", ".dat", ".xml"})
-
 _BINARY = {
     ".h5": "a table of DeepLabCut or SLEAP", ".hdf5": "a table in HDF5", ".slp": "a SLEAP project",
     ".mat": "MATLAB's", ".pickle": "a pickle", ".pkl": "a pickle", ".xlsx": "a spreadsheet",
     ".ods": "a spreadsheet", ".kva": "Kinovea's own", ".trk": "Tracker's own", ".npy": "an array",
 }  # fmt: skip
-_POINT = re.compile(r"(.+)_cam(_?)(\d+)_([xy])")
-_OURS = re.compile(r"([uv])_?(\d+)")
+_SERIES = (
+    re.compile(r"(?P<target>.+)_cam(?P<below>_?)(?P<camera>\d+)_(?P<axis>[xy])"),
+    re.compile(r"(?P<axis>[uv])_?(?P<camera>\d+)"),
+    re.compile(r"(?P<target>.+)\.(?P<axis>x|y|score|likelihood)"),
+)
+"""Names of columns of several cameras or targets: of DLTdv and Argus, of ours, of poses."""
 _TIME = re.compile(
     r"(?:t|times?|timestamp)(?:[ _(\[/]*(s|sec|seconds|ms|msec|us|µs|ns)[)\]]*)?|"
     r"(seconds|milliseconds|ms)"
@@ -59,10 +62,14 @@ _PIXELS = (
     ("u", "v"), ("pixelx", "pixely"), ("x", "y"), ("x_px", "y_px"), ("position_x", "position_y"),
 )  # fmt: skip
 _WHOSE = ("track", "track_id", "particle", "id", "object_id", "tid", "individual")
-_CORNER = (("x", "y"), ("left", "top"), ("bb_left", "bb_top"), ("u", "v"), ("bbox_x", "bbox_y"))
-_WIDTH = (("w", "h"), ("width", "height"), ("bb_width", "bb_height"), ("bbox_w", "bbox_h"))
+_SIZED = tuple(product(
+    (("x", "y"), ("left", "top"), ("bb_left", "bb_top"), ("u", "v"), ("bbox_x", "bbox_y")),
+    (("w", "h"), ("width", "height"), ("bb_width", "bb_height"), ("bbox_w", "bbox_h")),
+))  # fmt: skip
+"""Corner and size of a box, as the names of their columns."""
 _OPPOSITE = (
-    ("x1", "y1", "x2", "y2"), ("xmin", "ymin", "xmax", "ymax"), ("left", "top", "right", "bottom"),
+    (("x1", "y1"), ("x2", "y2")), (("xmin", "ymin"), ("xmax", "ymax")),
+    (("left", "top"), ("right", "bottom")),
 )  # fmt: skip
 _UNSEEN = {"", "na", "n/a", "#n/a", "null", "none", "-", "--", "missing", "lost", "?"}
 _SEEN = (
@@ -146,12 +153,13 @@ def _tracks(
     name: str, header: list[list[str]], rows: list[list[str]], individual: str | None
 ) -> list[TrackFile]:
     """The tracks in the cells of a file."""
-    names = [_plain(cell) for cell in header[-1]] if header else []
-    if header and header[0][0].strip().lower() == "scorer":
-        return [_of_deeplabcut(name, header, _numbers(rows, len(names)), individual)]
+    heads = [[_plain(cell) for cell in row] for row in header] or [[]]
+    names = heads[-1]
     units = next((row for row in header if any(cell.strip().startswith("(") for cell in row)), None)
-    if header and "position_x" in map(_plain, header[0]):  # of TrackMate, above other names of them
-        names = [*map(_plain, header[0])]
+    if heads[0][:1] == ["scorer"]:
+        names = _of_poses(header, names)
+    if "position_x" in heads[0]:  # of TrackMate, above other names of them
+        names = heads[0]
         unit = units[names.index("position_x")].strip("() ").lower() if units else "pixel"
         if not unit.startswith("pix"):
             raise ValueError(
@@ -163,9 +171,13 @@ def _tracks(
     words = {row[who].strip() for row in rows} - {""} if who is not None else set()
     if who is not None and 0 < len(words) < max(len(rows), 2):  # else they count the rows
         whose = sorted(words, key=lambda word: (len(word), word))
-        chosen = _chosen(_matching(whose, individual) or whose, None)
+        chosen = _chosen(whose, individual, lenient=True)
         rows = [row for row in rows if row[who].strip() == chosen]
     values = _numbers(rows, width, names)
+    if not header:
+        if not 2 <= width <= 3:
+            raise ValueError("must have a header, or columns u and v")
+        names = ["frame" if _counts(values[:, 0]) else "t", "u", "v"][-width:]
     frame = next((names.index(key) for key in _FRAME if key in names), None)
     if who is not None and frame is not None:
         values = values[np.argsort(values[:, frame], kind="stable")]
@@ -173,23 +185,12 @@ def _tracks(
     if twice & {key for pair in _PIXELS for key in pair}:
         raise _several([f"{key} {names.count(key)} times" for key in sorted(twice)])
     columns = {key: values[:, names.index(key)] for key in names if key}
-    if any(_POINT.fullmatch(key) for key in columns):
-        return _of_points(name, columns, individual)
-    if any(_OURS.fullmatch(key) for key in columns):
-        return _of_cameras(name, columns)
-    parts = sorted({key[:-2] for key in columns if key.endswith(".x")})
-    if parts:  # of SLEAP
-        part = _chosen(_matching(parts, individual) or parts, None)
-        score = {"score": columns[f"{part}.score"]} if f"{part}.score" in columns else {}
-        columns |= {"u": columns[f"{part}.x"], "v": columns[f"{part}.y"]} | score
-    if not header:
-        known = {2: ("u", "v"), 3: ("frame", "u", "v")}.get(values.shape[1])
-        if known is None:
-            raise ValueError("must have a header, or columns u and v")
-        columns = {key: values[:, i] for i, key in enumerate(known)}
-        if len(known) == 3 and not _counts(columns["frame"]):
-            columns["t"] = columns.pop("frame")
-    return [_of_columns(name, columns, _is_of_tracker(header) if units is None else False)]
+    if heads[0][:1] == ["scorer"] and not np.isfinite(columns["frame"]).all():
+        del columns["frame"]  # these are names of images
+    told = [m for known in _SERIES for key in columns if (m := known.fullmatch(key))]
+    if any(match["axis"] in "uvxy" for match in told):
+        return _of_series(name, columns, told, individual, lenient=who is not None)
+    return [_track(name, columns, of_world=units is None and _is_of_tracker(header))]
 
 
 # ------------------------------------------------------------------------------- text into numbers
@@ -282,19 +283,19 @@ def _numbers(rows: list[list[str]], width: int, names: Sequence[str] = ()) -> Fl
 # ------------------------------------------------------------------------------ numbers into tracks
 
 
-def _matching(names: Sequence[str], individual: str | None) -> list[str]:
+def _matching(names: Sequence[str], individual: str | None) -> Sequence[str]:
     """Those of the names that a user may mean by one: it, some of its words, or all and more."""
     if individual is None:
-        return list(names)
+        return names
     if individual in names:
         return [individual]
     said = set(individual.split())
     return [name for name in names if said <= set(name.split()) or set(name.split()) <= said]
 
 
-def _chosen(names: Sequence[str], individual: str | None) -> str:
-    """The target that is meant, or the only one there is."""
-    wanted = _matching(names, individual)
+def _chosen(names: Sequence[str], individual: str | None, *, lenient: bool) -> str:
+    """The target that is meant, or the only one there is; `lenient` if none need be called so."""
+    wanted = _matching(names, individual) or (names if lenient else [])
     if len(wanted) != 1:
         raise _several(wanted or names)
     return wanted[0]
@@ -307,80 +308,75 @@ def _several(names: Sequence[str]) -> ValueError:
     )
 
 
-def _of_points(name: str, columns: Mapping[str, Floats], individual: str | None) -> list[TrackFile]:
-    """DLTdv's or Argus's table of all points in all cameras, of which one point is the target."""
-    found: dict[tuple[str, int], dict[str, Floats]] = {}
-    upwards = False
-    for key, values in columns.items():
-        match = _POINT.fullmatch(key)
-        if match:
-            point, below, camera, axis = match.groups()
-            upwards = upwards or bool(below)
-            found.setdefault((point, int(camera)), {})[axis] = values
-    shown = {key: both for key, both in found.items() if np.isfinite([*both.values()]).any()}
-    point = _chosen(sorted({point for point, _ in shown}), individual)
-    for (one, camera), axes in shown.items():
-        if one == point and len(axes) < 2:
-            missing = "y" if "x" in axes else "x"
-            raise ValueError(f"must have a column {point}_cam{camera}_{missing}")
-    return [
-        _whole(f"{name}, cam{camera}", shown[point, camera]["x"] - 1,
-               shown[point, camera]["y"] - (0 if upwards else 1), {}, upwards=upwards)
-        for camera in sorted(camera for one, camera in shown if one == point)
-    ]  # fmt: skip
-
-
-def _of_deeplabcut(
-    name: str, header: list[list[str]], values: Floats, individual: str | None
-) -> TrackFile:
-    """DeepLabCut's table: one individual's body part."""
-    coords = [cell.strip().lower() for cell in header[-1]]
+def _of_poses(header: list[list[str]], coords: list[str]) -> list[str]:
+    """Names of the columns of DeepLabCut's table: individual and body part, and what it is."""
     width = min(map(len, header))
     if len(header) < 3 or not {"x", "y"} <= set(coords[:width]):
         raise ValueError("must have rows scorer, bodyparts and coords, with x and y in the last")
-    labels = [" ".join(row[i].strip() for row in header[1:-1]) for i in range(width)]
-    of = [i for i in range(1, width) if coords[i] in ("x", "y", "likelihood")]
-    chosen = _chosen(sorted({labels[i] for i in of}), individual)
-    columns = {coords[i]: values[:, i] for i in of if labels[i] == chosen}
-    if np.isfinite(values[:, 0]).all():
-        columns["frame"] = values[:, 0]
-    return _of_columns(name, columns, False)
+    parts = [" ".join(row[i].strip() for row in header[1:-1]) for i in range(1, width)]
+    return ["frame", *(f"{part}.{what}" for part, what in zip(parts, coords[1:], strict=False))]
 
 
-def _of_cameras(name: str, columns: Mapping[str, Floats]) -> list[TrackFile]:
-    """Our own table of all cameras."""
-    tidy = {key.replace("_", ""): values for key, values in columns.items()}
-    numbers = sorted({int(m[2]) for key in tidy if (m := _OURS.fullmatch(key))})
-    try:
-        return [
-            _whole(f"{name}, camera {i}", tidy[f"u{i}"], tidy[f"v{i}"], columns) for i in numbers
-        ]
-    except KeyError as missing:
-        raise ValueError(f"must have a column {missing}") from None
+def _of_series(
+    name: str, columns: Mapping[str, Floats], told: list[re.Match], individual: str | None, *,
+    lenient: bool,
+) -> list[TrackFile]:  # fmt: skip
+    """The tracks of one target, by columns whose names say of what target or camera they are."""
+    found: dict[tuple[str, int], dict[str, str]] = {}
+    for match in told:
+        if match.re == told[0].re:
+            of = {"target": "", "camera": "0"} | match.groupdict()
+            axis = {"x": "u", "y": "v"}.get(match["axis"], match["axis"])
+            found.setdefault((of["target"], int(of["camera"])), {})[axis] = match[0]
+    found = {of: axes for of, axes in found.items() if axes.keys() & {"u", "v"}}
+    shown = {
+        of: axes
+        for of, axes in found.items()
+        if np.isfinite([columns[key] for key in axes.values()]).any()
+    }
+    target = _chosen(sorted({one for one, _ in shown or found}), individual, lenient=lenient)
+    shared = {key: x for key, x in columns.items() if key in _FRAME or _TIME.fullmatch(key)}
+    # Of DLTdv and Argus the first pixel is 1; of Argus rows count up from the lowest one.
+    below = told[0].groupdict().get("below")
+    tracks = []
+    for one, camera in sorted(found):
+        if one != target:
+            continue
+        axes = found[one, camera]
+        if not {"u", "v"} <= axes.keys():
+            raise ValueError(f"must have columns of both axes, got only {', '.join(axes.values())}")
+        own = {axis: columns[key] for axis, key in axes.items()}
+        own["u"], own["v"] = own["u"] - (below is not None), own["v"] - (below == "")
+        where = f"{name}, camera {camera}" if "camera" in told[0].groupdict() else name
+        tracks.append(_track(where, shared | own, upwards=below == "_"))
+    return tracks
 
 
-def _of_columns(name: str, columns: Mapping[str, Floats], of_world: bool) -> TrackFile:
-    """One camera's columns; those of the world of a program may have any origin and unit."""
+def _track(
+    name: str, columns: Mapping[str, Floats], *, of_world: bool = False, upwards: bool = False
+) -> TrackFile:
+    """One camera's columns, with the rows of the frames that a file leaves out.
+
+    Those of the world of a program may have any origin and unit.
+    """
     doubts: tuple[str, ...] = ()
-    sized = [corner + size for corner in _CORNER for size in _WIDTH]
-    box, pair = (
-        next((keys for keys in known if set(keys) <= columns.keys()), None)
-        for known in ((*sized, *_OPPOSITE), _PIXELS)
-    )
+    boxes = (box for box in (*_SIZED, *_OPPOSITE) if {*box[0], *box[1]} <= columns.keys())
+    box = next(boxes, None)
+    pair = next((pair for pair in _PIXELS if set(pair) <= columns.keys()), None)
     if box:
-        low, high = (np.array([columns[key] for key in keys]) for keys in (box[:2], box[2:]))
-        sides = high if box in sized else high - low
+        low, high = (np.array([columns[key] for key in keys]) for keys in box)
+        sides = high if box in _SIZED else high - low
         # Edges of the first pixel are at -0.5 and 0.5; a box without an area is none.
-        u, v = np.where((sides > 0).all(axis=0), low + sides / 2 - 0.5, np.nan)
-        doubts += (f"{name}: the middles of its boxes are taken, of {', '.join(box)}",)
-    elif pair is None:
-        raise ValueError(f"must have columns u and v, got {', '.join(columns) or 'none':.80}")
+        pixels = np.where((sides > 0).all(axis=0), low + sides / 2 - 0.5, np.nan).T
+        doubts += (f"{name}: the middles of its boxes are taken, of {', '.join(box[0] + box[1])}",)
+    elif pair:
+        pixels = np.column_stack([columns[key] for key in pair])
     else:
-        u, v = (columns[key] for key in pair)
+        raise ValueError(f"must have columns u and v, got {', '.join(columns) or 'none':.80}")
     if pair == ("pixelx", "pixely"):  # corners at integers
-        u, v = u - 0.5, v - 0.5
+        pixels -= 0.5
     if of_world and pair == ("x", "y"):
-        if min(np.nanmin(u, initial=0), np.nanmin(v, initial=0)) < 0:
+        if np.nanmin(pixels, initial=0) < 0:
             raise ValueError(
                 "must hold pixels from the upper left corner, got x and y of Tracker or Kinovea "
                 "with another origin: export columns pixelx and pixely, or move the origin there"
@@ -390,10 +386,39 @@ def _of_columns(name: str, columns: Mapping[str, Floats], of_world: bool) -> Tra
             "corner, y down, which holds only if the axes were set so: export its columns pixelx "
             "and pixely",
         )
-    if max(np.nanmax(u, initial=0), np.nanmax(v, initial=0)) <= 1 and len(u) > 2:
+    if np.nanmax(pixels, initial=0) <= 1 and len(pixels) > 2:
         doubts += (f"{name}: no pixel of it is beyond 1: are these fractions of the image?",)
-    seen = _seen(columns)
-    return _whole(name, np.where(seen, u, np.nan), np.where(seen, v, np.nan), columns, doubts)
+    pixels[~_seen(columns)] = np.nan
+    # What many programs write where nothing was found.
+    unset = (pixels[:, 0] == pixels[:, 1]) & (pixels[:, 0] <= 0) & (pixels[:, 0] % 1 == 0)
+    if unset.any():
+        marks = ", ".join(f"{value:g}, {value:g}" for value in np.unique(pixels[unset, 0]))
+        doubts += (f"{name}: {marks} in {unset.sum()} of {len(unset)} rows is taken for not seen",)
+    pixels[unset | ~np.isfinite(pixels).all(axis=1)] = np.nan
+    frames = next((columns[key] for key in _FRAME if key in columns), None)
+    counts = frames is not None and _counts(frames)
+    clock = next((match for key in columns if (match := _TIME.fullmatch(key))), None)
+    if clock is None:
+        if frames is not None and not counts:
+            raise ValueError("must have increasing whole numbers of frames")
+        if frames is None:
+            return TrackFile(name, pixels, None, doubts, upwards=upwards)
+        whole = (frames - frames[0]).astype(int)
+        filled = np.full((whole[-1] + 1, 2), np.nan)
+        filled[whole] = pixels
+        return TrackFile(name, filled, None, doubts, int(frames[0]), upwards)
+    # Seconds in milli-, micro- or nanoseconds, by their first letter.
+    unit = {"m": 1e-3, "u": 1e-6, "µ": 1e-6, "n": 1e-9}.get((clock[1] or clock[2] or "s")[0], 1.0)
+    t = unit * columns[clock[0]]
+    if not np.isfinite(t).all() or (np.diff(t) <= 0).any():
+        raise ValueError(f"must have increasing times, got others as {clock[0]}")
+    # No camera takes longer from one frame to the next.
+    if len(t) > 1 and (step := np.median(np.diff(t))) > 2.0:
+        doubts += (
+            f"{name}: its times are {step:.4g} apart: if these are milliseconds, "
+            f"call the column {clock[0]}_ms",
+        )
+    return TrackFile(name, pixels, _unrounded(t), doubts, upwards=upwards)
 
 
 def _seen(columns: Mapping[str, Floats]) -> Bools:
@@ -407,49 +432,6 @@ def _seen(columns: Mapping[str, Floats]) -> Bools:
         elif key in ("occluded", "lost", "missing", "outside", "invisible"):
             seen &= ~(values > 0)
     return seen
-
-
-def _whole(
-    name: str,
-    u: Floats,
-    v: Floats,
-    columns: Mapping[str, Floats],
-    doubts: tuple[str, ...] = (),
-    upwards: bool = False,
-) -> TrackFile:
-    """A track with the rows of the frames that a file leaves out."""
-    clock = next((key for key in columns if _TIME.fullmatch(key)), None)
-    t, frames = None, next((columns[key] for key in _FRAME if key in columns), None)
-    if clock is not None:
-        match = _TIME.fullmatch(clock)
-        unit = (match and (match[1] or match[2])) or "s"
-        # Seconds in milli-, micro- or nanoseconds, by their first letter.
-        t = columns[clock] * {"m": 1e-3, "u": 1e-6, "µ": 1e-6, "n": 1e-9}.get(unit[0], 1.0)
-    pixels = np.column_stack((u, v))
-    # What many programs write where nothing was found.
-    unset = (pixels[:, 0] == pixels[:, 1]) & (pixels[:, 0] <= 0) & (pixels[:, 0] % 1 == 0)
-    if unset.any():
-        marks = ", ".join(f"{value:g}, {value:g}" for value in np.unique(pixels[unset, 0]))
-        doubts += (f"{name}: {marks} in {unset.sum()} of {len(unset)} rows is taken for not seen",)
-    pixels[unset | ~np.isfinite(pixels).all(axis=1)] = np.nan
-    if t is not None and (not np.isfinite(t).all() or (np.diff(t) <= 0).any()):
-        raise ValueError(f"must have increasing times, got others as {clock}")
-    if frames is not None and not _counts(frames):
-        if t is None:
-            raise ValueError("must have increasing whole numbers of frames")
-        frames = None
-    # No camera takes longer from one frame to the next.
-    if t is not None and len(t) > 1 and (step := np.median(np.diff(t))) > 2.0:
-        doubts += (
-            f"{name}: its times are {step:.4g} apart: if these are milliseconds, "
-            f"call the column {clock}_ms",
-        )
-    if frames is None or t is not None:
-        return TrackFile(name, pixels, None if t is None else _unrounded(t), doubts, 0, upwards)
-    whole = (frames - frames[0]).astype(int)
-    filled = np.full((whole[-1] + 1, 2), np.nan)
-    filled[whole] = pixels
-    return TrackFile(name, filled, None, doubts, int(frames[0]), upwards)
 
 
 def _unrounded(t: Floats) -> Floats:

@@ -3,58 +3,51 @@
 Three ways to find it stand behind one call. A *background model* (`background`) knows all frames
 and finds what differs from what is at rest: to 1/100 of a pixel, as long as camera and background
 stay as they are. Where they do not, `moving` takes out the camera's motion and the light's, and
-follows what moves most plainly of all that does. A *detector* (`detector`) knows what targets
-look like and finds it in each frame on its own, whatever the background does, to a few tenths of a
-pixel. The paper has one of that kind, YOLO-v8; what such a detector sees in the single frames is
-linked here to one motion.
+follows what moves most plainly of all that does. A *detector* knows what targets look like and
+finds it in each frame on its own, whatever the background does, to a few tenths of a pixel; what it
+sees in the single frames is linked to one motion.
+
+The paper tracks with a detector, YOLO-v8. Its vendor's code and weights cannot be part of this
+package, so here is a small network of the same family, written and trained from scratch (see
+`network`). And any YOLO-v8 model that a user has exported to ONNX runs behind the same method,
+through OpenCV. Both turn an image into *predictions* of shape (5, n), one column per anchor: centre
+(u, v), width and height in pixels, confidence in [0, 1]. `detections` averages those that agree.
 
 A frame gets NaN where the target is not seen, or not for sure.
-
-Where two meet in an image, nobody can say which is which afterwards: who is who, across meetings
-and views, is for the cameras to tell (`cameras.identify`). So a track is that of one target from
-one meeting to the next.
 """
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
 from pathlib import Path
+from typing import NamedTuple
 
+import cv2
 import numpy as np
 
-from ..arrays import Bools
-from ..checks import check_instance, check_integer, shown
-from .background import (
-    LONGEST,
-    BackgroundModel,
-    sample_frames,
-    track_blobs,
-    view_distances,
-    whole_views,
-)
-from .candidates import Candidates, best_path, plainest_paths
-from .candidates import Path as Motion
-from .detector import Detection, LearnedDetector, OnnxDetector, detections
-from .hints import Hint
-from .moving import (
-    Film,
-    Track,
-    Ways,
-    expected,
-    finished,
-    follow,
-    lens_of,
-    nothing,
-    sighted,
-    viewed,
-)
+from ..arrays import Floats, Floats32, Image
+from ..checks import MALFORMED, check_instance, check_path, shown
+from .background import LONGEST, BackgroundModel, sample_frames, whole_blobs
+from .candidates import Candidates, Hint, best_path
+from .moving import Track, follow
 from .refining import scatter
 from .video import Reel, read_video, video_info
 
 DETECTORS = ("auto", "background", "learned")
+WEIGHTS = Path(__file__).with_name("detector.pt")
+"""The weights of the package's own network; detector.json beside it is their training log."""
+LEAST = 0.4
+"""Smallest confidence of a detection. Detectors of this family are modest: the package's own gives
+0.44 to 0.9 to whole targets, more the smaller they are, and less than 0.3 to what is none."""
+
+Predictions = Floats32
+"""Centre (u, v), width, height and confidence of each anchor, shape (5, n)."""
+
+
+# ------------------------------------------------------------------------------------------ tracks
 
 
 def track(
@@ -121,7 +114,8 @@ def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | 
     model.learn_target(samples)
     if detector == "auto" and model.several_colours:
         return follow(frames, samples, target)
-    found, blurred = _track_blobs(frames.whole, model)
+    pixels, confidence, blurred = whole_blobs(model, frames.whole)
+    found = Track(pixels, confidence, "background")
     if detector == "auto" and (blurred or not _plausible(found, target)):
         return follow(frames, samples, target)
     found = replace(found, warnings=model.unrest)
@@ -181,25 +175,6 @@ def check_detector(name: str | os.PathLike) -> None:
         raise FileNotFoundError(f"detector: no such file, got '{name}'")
 
 
-def _track_blobs(reel: Reel, model: BackgroundModel) -> tuple[Track, bool]:
-    """The background model's track, and whether outlines are too blurred for it.
-
-    It tells whole views by their outlines: where these are blurred, by motion or a codec, and many
-    views are left out, it is by the blur that they differ.
-    """
-    blobs = list(track_blobs(model, reel))
-    distance = view_distances(blobs)
-    whole = whole_views(distance)
-    centroids = np.array([b.centroid if b else (np.nan, np.nan) for b in blobs], float)
-    centroids[~whole] = np.nan
-    inside = np.array([b is not None and b.inside for b in blobs])
-    soft = [b.softness for b in blobs if b is not None and b.inside]
-    # Of a sharp outline it is 0.6, see `Blob`.
-    # Share of views that are whole, below which a blurred outline cannot be trusted.
-    blurred = bool(inside.any() and np.median(soft) > 1.0 and whole[inside].mean() < 0.95)
-    return Track(centroids, np.exp(-distance), "background"), blurred
-
-
 def _link_detections(path: str | os.PathLike, name: str | os.PathLike) -> Track:
     detector = LearnedDetector() if name == "learned" else OnnxDetector(name)
     chain = link([detections(detector.predict(frame)) for frame in read_video(path)])
@@ -235,111 +210,152 @@ def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
     return chain
 
 
-def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
-    """Track so many moving targets of a video, each where it is apart from the others.
+# --------------------------------------------------------------------------------------- detectors
+
+
+class LearnedDetector:
+    """The package's own network.
+
+    Parameters
+    ----------
+    weights : path
+        As written by ``python -m vidsindy_lite train-detector``.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    """
+
+    def __init__(self, weights: str | os.PathLike = WEIGHTS) -> None:
+        import torch  # takes a second, which most videos do not need
+
+        from .network import Network
+
+        weights = check_path("weights", weights)
+        if not weights.is_file():
+            raise FileNotFoundError(f"weights: no such file, got '{weights}'")
+        network = Network()
+        network.load_state_dict(torch.load(weights, weights_only=True))
+        self.network = network.eval().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+
+    def predict(self, image: Image) -> Predictions:
+        """Predictions, (5, n), for an image (height, width, 3) uint8, red, green and blue."""
+        return self.predict_all(image[None])[0]
+
+    def predict_all(self, images: Image) -> Predictions:
+        """Predictions, (b, 5, n), for images of one size: many small ones are quicker at once."""
+        import torch
+
+        from .network import as_input
+
+        height, width = images.shape[1:3]
+        # The sides of what the network takes are multiples of its coarsest stride.
+        margins = ((0, 0), (0, -height % 16), (0, -width % 16), (0, 0))
+        with torch.inference_mode():
+            found = self.network(as_input(np.pad(images, margins, "edge")))
+            found[:, 4].sigmoid_()
+        return found.numpy()
+
+
+class OnnxDetector:
+    """A YOLO-v8 detection model that was exported to ONNX with a fixed input shape, in fp32.
+
+    Frames are shrunk or enlarged to the model's input size and padded with grey, as in training.
+    Of several classes the most confident counts.
 
     Parameters
     ----------
     path : path
-        A video in which nothing else moves as plainly.
-    count : int
-        How many targets there are.
-
-    Returns
-    -------
-    tuple of Track
-        NaN wherever two targets meet. Behind a meeting a track may be that of another target. If
-        fewer things move, the last tracks are NaN throughout.
+        The .onnx file, which is there.
 
     Raises
     ------
-    FileNotFoundError, ValueError
-        If the file is missing or no video.
+    ValueError
+        If OpenCV cannot read it, or its shapes are not those of a YOLO-v8 detection model.
     """
-    check_integer("count", count, least=1)
-    frames = Reel(path, LONGEST)
-    samples = sample_frames(frames)
-    # Before a plain background, all that could tell of a camera's motion may be the targets.
-    film = Film.of(frames, samples, BackgroundModel(samples).camera_rests)
-    seen, lights = sighted(film, targets=count)
-    n = len(lights)
-    # Paths of a target that may follow each other.
-    paths = plainest_paths(seen, most=count * 8)
-    lanes, strange = _lanes(seen, paths, count)
-    ways = [_joined([expected(seen, p.rows, film, n) for p in lane]) for lane in lanes]
-    touching = _touching(ways)
-    # One that is not seen may be in one with any of the others.
-    lost = np.ones((len(lanes), n), bool)
-    for missed, lane in zip(lost, lanes, strict=True):
-        missed[seen.frame[np.concatenate([path.rows for path in lane])]] = False
-    doubts = _doubts(seen, strange, film.factor, n, Path(path).name)
-    tracks = []
-    lens = lens_of(samples, film, *ways)
-    for way, hidden, missed in zip(ways, touching, lost, strict=True):
-        apart = np.asarray(lost.sum(axis=0) == missed)
-        way.centre[hidden] = np.nan
-        tracks.append(finished(viewed(film, lens, way, lights), film.motion, doubts, apart))
-        doubts = ()
-    return (*tracks, *[nothing(film.motion, n)] * (count - len(tracks)))
+
+    def __init__(self, path: str | os.PathLike) -> None:
+        self.path = path
+        try:
+            self.network = cv2.dnn.readNetFromONNX(str(path), cv2.dnn.ENGINE_NEW)
+        except (*MALFORMED, cv2.error) as error:
+            raise ValueError(
+                f"detector: must be an ONNX file that OpenCV can run, got '{self.path}': "
+                f"{shown(str(error))}"
+            ) from None
+        # OpenCV tells the shape of an input only in its description of the whole network.
+        shape = set(re.findall(r"<Input> \w+ \[1 x 3 x (\d+) x (\d+)\]", self.network.dump()))
+        if len(shape) != 1:
+            raise ValueError(
+                "detector: must take one image of fixed shape (1, 3, height, width), got another "
+                f"input in '{self.path}'"
+            )
+        self.height, self.width = map(int, shape.pop())
+
+    def predict(self, image: Image) -> Predictions:
+        """Predictions, (5, n), for an image (height, width, 3) uint8, red, green and blue."""
+        height, width = image.shape[:2]
+        scale = min(self.height / height, self.width / width)
+        size = round(scale * width), round(scale * height)
+        left, top = (self.width - size[0]) // 2, (self.height - size[1]) // 2
+        margins = (top, self.height - size[1] - top, left, self.width - size[0] - left)
+        resized = cv2.resize(image, size, interpolation=cv2.INTER_LINEAR)
+        padded = cv2.copyMakeBorder(resized, *margins, cv2.BORDER_CONSTANT, value=(114,) * 3)
+        self.network.setInput(cv2.dnn.blobFromImage(padded, 1 / 255))
+        found = np.asarray(self.network.forward(), np.float32)
+        if found.ndim != 3 or len(found) != 1 or found.shape[1] < 5:
+            raise ValueError(
+                "detector: must give one array of shape (1, 4 + classes, anchors), "
+                f"got {found.shape} from '{self.path}'"
+            )
+        found = np.concatenate([found[0, :4], found[0, 4:].max(axis=0, keepdims=True)])
+        found[:2] -= np.array([[left], [top]])
+        found[:4] /= scale
+        found[:2] -= 0.5  # YOLO counts from the corner of the first pixel, we from its centre
+        return found
 
 
-def _lanes(
-    seen: Candidates, paths: list[Motion], count: int
-) -> tuple[list[list[Motion]], list[Motion]]:
-    """The paths of each target, one after the other in time; and paths for which none is left."""
-    lanes: list[list[Motion]] = []
-    left = []
-    plainest = max((path.rating / len(path.rows) for path in paths), default=0.0)
-    taken = np.zeros((count, 1 + seen.frame.max(initial=0)), bool)
-    for path in sorted(paths, key=lambda path: -len(path.rows)):
-        # Worth of a candidate of a path, relative to those of the plainest.
-        if path.rating / len(path.rows) < 0.4 * plainest:
-            continue
-        first, last = seen.frame[path.rows[[0, -1]]]
-        free = np.flatnonzero(~taken[:, first : last + 1].any(axis=1))
-        if not len(free):
-            left.append(path)
-            continue
-        taken[free[0], first : last + 1] = True
-        if free[0] == len(lanes):
-            lanes.append([])
-        lanes[free[0]].append(path)
-    return lanes, left
+# ------------------------------------------------------------------------------------- predictions
 
 
-def _joined(ways: list[Ways]) -> Ways:
-    """The ways of paths that follow each other as one."""
-    whole, *others = ways
-    for way in others:
-        free = np.isnan(whole.centre[:, :1])
-        whole = Ways(*(np.where(free, b, a) for a, b in zip(whole, way, strict=True)))
-    return whole
+class Detection(NamedTuple):
+    """Centre (2,) and size (2,) of the target in pixels, and how sure that is, in [0, 1]."""
+
+    centre: Floats
+    size: Floats
+    confidence: float
 
 
-def _touching(ways: list[Ways]) -> list[Bools]:
-    """In which frames each target touches another one, or hides it."""
-    found = [np.zeros(len(ways[0].centre), bool) for _ in ways]
-    for (i, one), (j, other) in combinations(enumerate(ways), 2):
-        apart = np.linalg.norm(one.centre - other.centre, axis=1)
-        sizes = (one.box[:, 2:].max(axis=1) + other.box[:, 2:].max(axis=1)) / 2
-        # Sizes, and pixels more, between two targets that do not touch.
-        met = apart < 1.3 * sizes + 2.0
-        found[i] |= met
-        found[j] |= met
+def detections(predictions: Predictions, least: float = LEAST, most: int = 3) -> list[Detection]:
+    """What the predictions show, the surest first.
+
+    The most confident prediction is averaged with those that agree with it, which is where the
+    fractions of a pixel come from; the others near it are left out, and so on.
+
+    Parameters
+    ----------
+    predictions : ndarray, shape (5, n)
+    least : float
+        Smallest confidence of a detection.
+    most : int
+        Largest number of detections.
+
+    Returns
+    -------
+    list of Detection
+    """
+    found: list[Detection] = []
+    predictions = predictions[:, predictions[4] >= least / 2]
+    while len(found) < most and predictions.shape[1]:
+        best = predictions[:, np.argmax(predictions[4])]
+        if best[4] < least:
+            break
+        apart = np.hypot(*(predictions[:2] - best[:2, None])) / best[2:4].mean()
+        # Within a quarter of its size predictions speak of one target, if they are half as sure.
+        agree = (apart <= 0.25) & (predictions[4] >= best[4] / 2)
+        weight = predictions[4, agree]
+        mean = np.average(predictions[:4, agree].astype(float), axis=1, weights=weight)
+        found.append(Detection(mean[:2], mean[2:], float(best[4])))
+        predictions = predictions[:, apart > 1]
     return found
-
-
-def _doubts(
-    seen: Candidates, strange: list[Motion], factor: int, frames: int, name: str
-) -> tuple[str, ...]:
-    """Does one thing more move than there are targets?"""
-    longest = max(strange, key=lambda path: len(path.rows), default=None)
-    # Share of the frames in which one more thing moves, above which there is doubt.
-    if longest is None or len(longest.rows) < 0.2 * frames:
-        return ()
-    row = longest.rows[len(longest.rows) // 2]
-    u, v = factor * seen.place[row]
-    return (
-        f"{name}: one thing more moves than there are targets, e.g. in frame {seen.frame[row]} at "
-        f"({u:.0f}, {v:.0f})",
-    )

@@ -123,17 +123,7 @@ class Stills(NamedTuple):
     clock: Floats
     pages: bool = False
 
-    def read(self, number: int, bits: int) -> Image:
-        """One image, upright, of so many bits made eight."""
-        file = self.files[number]
-        image = self._decoded(number)
-        if image is None:
-            raise ValueError(f"path: must be an image that OpenCV can read, got '{file}'")
-        if image.dtype == np.uint16:
-            image = np.clip(image >> (bits - 8), 0, 255).astype(np.uint8)
-        return _turned(cast("Image", image))
-
-    def bits(self) -> int:
+    def _bits(self) -> int:
         """How many bits the film uses, by some of its images: an even number, from 8 to 16."""
         shown = np.unique(np.linspace(0, len(self.files) - 1, 9).astype(int)).tolist()
         images = [image for k in shown if (image := self._decoded(k)) is not None]
@@ -143,14 +133,23 @@ class Stills(NamedTuple):
     def pick(self, numbers: Iterable[int]) -> Iterator[Image]:
         """The images of these numbers as far as they go, red, green and blue, all of one size.
 
+        They are upright, and the bits that the film uses are made eight.
+
         Raises
         ------
         ValueError
             Where an image cannot be read or has another size.
         """
-        size, bits = None, self.bits()
+        size, bits = None, self._bits()
         for k in (number for number in numbers if number < len(self.files)):
-            image = self.read(k, bits)
+            image = self._decoded(k)
+            if image is None:
+                raise ValueError(
+                    f"path: must be an image that OpenCV can read, got '{self.files[k]}'"
+                )
+            if image.dtype == np.uint16:
+                image = np.clip(image >> (bits - 8), 0, 255).astype(np.uint8)
+            image = _turned(cast("Image", image))
             size = size or image.shape[1::-1]
             if image.shape[1::-1] != size:
                 raise ValueError(
@@ -422,8 +421,7 @@ def read_video(path: str | os.PathLike) -> Iterator[Image]:
         At once, if the file is missing, empty, not a video, or holds no frame.
     """
     _first(path)
-    stills = find_stills(Path(path))
-    return stills.pick(range(len(stills.files))) if stills else _images(path)
+    return _images(path)
 
 
 def read_frame(path: str | os.PathLike, number: int) -> Image:
@@ -601,15 +599,16 @@ def _decoded(
 
 def _first(path: str | os.PathLike) -> Image:
     """The first frame of a film, which must have one."""
-    if stills := find_stills(check_path("path", path)):
-        return stills.read(0, 16)
     for image in _images(path):
         return image
     raise ValueError(f"path: must hold at least one frame, got none in '{path}'")
 
 
 def _images(path: str | os.PathLike) -> Iterator[Image]:
-    """All frames of a file; it is opened with the first and closed after the last."""
+    """All frames of a film; a file is opened with the first and closed after the last."""
+    if stills := find_stills(check_path("path", path)):
+        yield from stills.pick(range(len(stills.files)))
+        return
     with _opened(path) as (container, stream):
         yield from map(_image, _decoded(container, stream))
 
