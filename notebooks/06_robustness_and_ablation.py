@@ -238,11 +238,12 @@ told = table[(table.method == "Gauss-Newton") & table.exact]
 doubted_here = (told.status == "suspect").mean()
 print(f"{doubted_here:.0%} of the exact laws of Gauss-Newton are doubted; no path: {no_path}")
 if full:
-    assert (right.loc[kind, ["Gauss-Newton", "spline-ADO"]] >= 0.7).all(axis=None)
+    assert (right.loc[kind, "Gauss-Newton"] >= 0.95).all()
+    assert (right.loc[kind, "spline-ADO"] >= 0.7).all()
     assert noisy["Gauss-Newton"] > noisy.drop("Gauss-Newton").max() + 0.2
     assert 2 * seconds["Gauss-Newton"] < seconds["spline-ADO"]
-    assert no_path == {"SprottE", "RayleighBenard"}
-    assert 0.25 < doubted_here < 0.75
+    assert no_path == {"SprottE"}
+    assert 0.2 < doubted_here < 0.5
 
 # %% jupyter={"source_hidden": true} tags=["hide-input"]
 TITLES = {"noise": "noise", "blocks": "blocks missing", "fibers": "fibers missing"}
@@ -331,7 +332,7 @@ robustness("fig_3", caption, sprott[sprott.method.isin(both)], paper)
 # %% [markdown]
 # *Fig. 3: relative error (top) and wrong terms (bottom) for SprottF of both optimisers of the paper's model; points are
 # medians of the trials, bars hold the middle half of them. Stars: what the paper prints for its own
-# method. From 30 % noise on, the cameras cannot be learned from these tracks, and there is no law: an error of 100 %.*
+# method. With 50 % noise the cameras cannot be learned from these tracks, and there is no law: an error of 100 %.*
 #
 # ## PySINDy under the same (Fig. S4)
 
@@ -696,16 +697,16 @@ for row in rows:
 # %% [markdown]
 # ## What we learned
 #
-# * **The paper's method works.** Clean, and with blocks or fibers missing in the tracks, both optimisers of its model find
-#   seven laws of ten and more from whole pixels: gaps cost little.
-#   <!-- by: (right.loc[kind, ["Gauss-Newton", "spline-ADO"]] >= 0.7).all(axis=None); figure study_all_methods -->
+# * **The paper's method works.** Clean, and with blocks or fibers missing in the tracks, its own optimiser finds seven laws of
+#   ten and more from whole pixels, Gauss-Newton nearly all: gaps cost little.
+#   <!-- by: (right.loc[kind, "Gauss-Newton"] >= 0.95).all(); (right.loc[kind, "spline-ADO"] >= 0.7).all(); figure study_all_methods -->
 # * Noise and time are what Gauss-Newton gains: with 10 % noise in the tracks it finds more laws than any other method, spline-ADO
 #   among them, in less than half of its processor time.
 #   <!-- by: noisy["Gauss-Newton"] > noisy.drop("Gauss-Newton").max() + 0.2; 2 * seconds["Gauss-Newton"] < seconds["spline-ADO"] -->
-# * With 20 % noise the cameras of two systems cannot be learned from their tracks, and no method has a path.
-#   <!-- by: no_path == {"SprottE", "RayleighBenard"} -->
-# * Gauss-Newton doubts about half of the exact laws of this regime, for the errors of the detector are no noise and the views say so.
-#   <!-- by: 0.25 < doubted_here < 0.75 -->
+# * With 20 % noise the cameras cannot be learned from the tracks of SprottE, and no method has a path.
+#   <!-- by: no_path == {"SprottE"} -->
+# * Gauss-Newton doubts about a third of the exact laws of this regime, for the errors of the detector are no noise and the views say so.
+#   <!-- by: 0.2 < doubted_here < 0.5 -->
 # * Gaps in exact samples cost next to nothing.
 #   <!-- by: gaps.exact.all(); (gaps.l2 < 1e-4).all() -->
 # * The limit is information, and the Cramér-Rao bound knows it in advance: Tsucs2 has one term that
