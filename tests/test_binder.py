@@ -24,11 +24,7 @@ def test_binder_takes_the_python_of_the_nightly_run():
 @pytest.mark.slow
 def test_binder_installs_these_versions_and_the_package():
     command = [sys.executable, "-m", "pip", "install", "--dry-run", "--no-deps", "--no-index"]
-    command += [
-        "--no-build-isolation",
-        "-r",
-        "binder/requirements.txt",
-    ]
+    command += ["--no-build-isolation", "-r", "binder/requirements.txt"]
     done = subprocess.run(
         command, cwd=ROOT, env=os.environ | {"PYTHONPATH": ""}, capture_output=True, text=True
     )

@@ -775,10 +775,7 @@ def _times(
 
 
 def _with_law(
-    seen: Observation,
-    names: Sequence[str],
-    how: dict[str, Any],
-    default: bool,
+    seen: Observation, names: Sequence[str], how: dict[str, Any], default: bool
 ) -> VideoDiscovery:
     """An observation with the law that it obeys, given what else `discover` takes.
 

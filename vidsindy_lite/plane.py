@@ -16,14 +16,7 @@ import numpy as np
 
 from .arrays import Floats
 from .cameras import Lags, OrthographicCamera, Rig
-from .checks import (
-    check_array,
-    check_integer,
-    check_number,
-    check_positive,
-    check_vector,
-    shown,
-)
+from .checks import check_array, check_integer, check_number, check_positive, check_vector, shown
 from .dynamics import (
     Discovery,
     Round,

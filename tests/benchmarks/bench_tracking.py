@@ -10,13 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vidsindy_lite.vision import (
-    BACKGROUNDS,
-    Scene,
-    read_video,
-    render_video,
-    track,
-)
+from vidsindy_lite.vision import BACKGROUNDS, Scene, read_video, render_video, track
 
 FRAMES = 1500
 REPEATS = 3

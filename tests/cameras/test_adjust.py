@@ -9,12 +9,7 @@ from hypothesis import strategies as st
 
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import Lags, learn_cameras, systematic_errors
-from vidsindy_lite.cameras.adjust import (
-    adjust,
-    fitted_factor,
-    known_to,
-    long_run_covariance,
-)
+from vidsindy_lite.cameras.adjust import adjust, fitted_factor, known_to, long_run_covariance
 from vidsindy_lite.cameras.clocks import Footage
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -6,12 +6,7 @@ import pytest
 from helpers import trajectory
 from scipy.optimize import least_squares
 
-from vidsindy_lite.cameras import (
-    OrthographicCamera,
-    PerspectiveCamera,
-    Rig,
-    reconstruct,
-)
+from vidsindy_lite.cameras import OrthographicCamera, PerspectiveCamera, Rig, reconstruct
 from vidsindy_lite.cameras.models import epipolar_lines, epipolar_rows, intersect
 
 

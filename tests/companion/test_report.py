@@ -21,12 +21,7 @@ import vidsindy_lite as vl
 from vidsindy_lite import study
 from vidsindy_lite.cameras import Lags
 from vidsindy_lite.companion import report
-from vidsindy_lite.companion.report import (
-    FILES,
-    check_folder_is_free,
-    write_refusal,
-    write_report,
-)
+from vidsindy_lite.companion.report import FILES, check_folder_is_free, write_refusal, write_report
 from vidsindy_lite.pipeline import Observation, Refused
 from vidsindy_lite.vision import read_tracks
 

@@ -98,8 +98,7 @@ def test_formulas_and_figures_are_drawn(site, browser):
 
 
 @pytest.mark.parametrize(
-    "origin",
-    ["https://github.com/some-one/film.law.git\n", "git@github.com:some-one/film.law.git"],
+    "origin", ["https://github.com/some-one/film.law.git\n", "git@github.com:some-one/film.law.git"]
 )
 def test_a_notebook_of_a_repository_on_github_opens_on_binder_and_colab(conf, origin):
     told = conf.launchers("notebooks/01_projection_proofs", origin)

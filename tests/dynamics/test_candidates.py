@@ -25,8 +25,7 @@ def swing(friction=0.1, amplitude=1.5, noise=0.01, seed=0, n=700):
 
 
 @pytest.mark.parametrize(
-    ("friction", "library"),
-    [(0.1, PENDULUM), (0.0, Library.polynomial(3) + Library.fourier(1))],
+    ("friction", "library"), [(0.1, PENDULUM), (0.0, Library.polynomial(3) + Library.fourier(1))]
 )
 def test_a_pendulum_at_a_large_amplitude_is_found_from_its_angle_alone(friction, library):
     law, t, x = swing(friction)

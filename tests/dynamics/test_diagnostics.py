@@ -134,8 +134,7 @@ def test_a_fit_that_did_not_converge_is_named_with_advice(duffing, status, words
 
 
 @pytest.mark.parametrize(
-    ("noise", "times"),
-    [(0.02, r"\d+\.\d times"), (1e-9, "more than 100 times")],
+    ("noise", "times"), [(0.02, r"\d+\.\d times"), (1e-9, "more than 100 times")]
 )
 def test_a_misfit_has_a_size_in_units_of_the_data_and_of_their_spread(noise, times):
     # The constant of a decay changes after half of the time: the curve of no law meets both.

@@ -14,11 +14,7 @@ from vidsindy_lite.dynamics.inference import _pruned
 from vidsindy_lite.dynamics.l0 import closest_rival, inverse, subset_path, subset_search
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.model import PolynomialSystem
-from vidsindy_lite.dynamics.problem import (
-    GAP,
-    OFFSET_PENALTY,
-    fit_curves,
-)
+from vidsindy_lite.dynamics.problem import GAP, OFFSET_PENALTY, fit_curves
 from vidsindy_lite.study import SYSTEMS
 
 

@@ -12,16 +12,10 @@ from vidsindy_lite.dynamics.data import (
     typical_step,
     variable_names,
 )
-from vidsindy_lite.dynamics.library import (
-    monomial_exponents,
-)
+from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.model import PolynomialSystem, integrate, runge_kutta_4
 
-LORENZ = {
-    "x": {"x": -10, "y": 10},
-    "y": {"x": 28, "xz": -1, "y": -1},
-    "z": {"xy": 1, "z": -8 / 3},
-}
+LORENZ = {"x": {"x": -10, "y": 10}, "y": {"x": 28, "xz": -1, "y": -1}, "z": {"xy": 1, "z": -8 / 3}}
 
 
 @st.composite

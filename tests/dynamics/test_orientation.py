@@ -7,11 +7,7 @@ from scipy.spatial.transform import Rotation
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics.l0 import inverse
 from vidsindy_lite.dynamics.library import Library
-from vidsindy_lite.dynamics.orientation import (
-    apart,
-    in_axes,
-    with_turns,
-)
+from vidsindy_lite.dynamics.orientation import apart, in_axes, with_turns
 from vidsindy_lite.dynamics.solver import _solved, _Task
 from vidsindy_lite.study import SYSTEMS
 

@@ -138,10 +138,7 @@ def test_terms_that_cancel_are_told():
     assert warning.startswith("the terms of dx/dt cancel")
 
 
-@pytest.mark.parametrize(
-    ("name", "order"),
-    [("bob", 2), ("pendulum", 1), ("pendulum, angle", 2)],
-)
+@pytest.mark.parametrize(("name", "order"), [("bob", 2), ("pendulum", 1), ("pendulum, angle", 2)])
 def test_a_law_on_a_shape_is_never_simply_ok(name, order):
     x, words = NAMED[name]
     noisy = x + 0.01 * x.std() * np.random.default_rng(0).standard_normal(x.shape)

@@ -18,13 +18,7 @@ import vidsindy_lite
 from vidsindy_lite.dynamics import solver
 from vidsindy_lite.dynamics.model import PolynomialSystem
 from vidsindy_lite.dynamics.solver import discover, one_blas_thread
-from vidsindy_lite.study import (
-    REFERENCE_OFFSET,
-    SYSTEMS,
-    add_noise,
-    drop_fibers,
-    score,
-)
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, drop_fibers, score
 
 
 def measured(name, noise, n=600, seed=11):

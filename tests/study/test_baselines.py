@@ -53,8 +53,7 @@ def by_hand(name, threshold):
 
 # Central differences at 100 samples a period are good for a percent; the weak form needs none.
 @pytest.mark.parametrize(
-    ("name", "most"),
-    [("PySINDy", 2e-2), ("E-SINDy", 2e-2), ("WeakSINDy", 1e-5), ("Model-A", 1e-3)],
+    ("name", "most"), [("PySINDy", 2e-2), ("E-SINDy", 2e-2), ("WeakSINDy", 1e-5), ("Model-A", 1e-3)]
 )
 @pytest.mark.filterwarnings("ignore:.*axes labeled", "ignore:Sparsity parameter is too big")
 def test_clean_lorenz_is_found_as_by_a_direct_call(name, most, monkeypatch, short_grid):

@@ -6,12 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from vidsindy_lite.dynamics import (
-    PolynomialSystem,
-    clamped_knots,
-    monomial_exponents,
-    monomials,
-)
+from vidsindy_lite.dynamics import PolynomialSystem, clamped_knots, monomial_exponents, monomials
 from vidsindy_lite.study.metrics import score
 from vidsindy_lite.study.paper import SYSTEMS
 from vidsindy_lite.study.spline_ado import SplineADOSettings, _Fit, spline_ado, stridge

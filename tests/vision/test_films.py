@@ -111,10 +111,7 @@ def error_of(found, truth):
 
 @pytest.mark.parametrize(
     "light",
-    [
-        lambda i: 0.8 + 0.15 * np.sin(1.7 * i),
-        lambda i: 1.0 if i < 54 else 0.7,
-    ],
+    [lambda i: 0.8 + 0.15 * np.sin(1.7 * i), lambda i: 1.0 if i < 54 else 0.7],
     ids=["flicker", "late"],
 )
 def test_changing_light_loses_no_frames(tmp_path, light):

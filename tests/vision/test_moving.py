@@ -9,13 +9,7 @@ from footage import Phone, camera_maps, write_phone
 from helpers import real
 
 from vidsindy_lite import Hint, track, write_video
-from vidsindy_lite.vision.camera import (
-    CameraMotion,
-    at_rest,
-    carry,
-    stands_still,
-    steadied,
-)
+from vidsindy_lite.vision.camera import CameraMotion, at_rest, carry, stands_still, steadied
 from vidsindy_lite.vision.candidates import Candidates
 from vidsindy_lite.vision.moving import expected, finished
 from vidsindy_lite.vision.refining import View, fitting, joined

@@ -8,11 +8,7 @@ from tiny_onnx import write_red_detector
 
 from vidsindy_lite import Hint
 from vidsindy_lite.vision import track_targets
-from vidsindy_lite.vision.rendering import (
-    Scene,
-    render_restless,
-    render_video,
-)
+from vidsindy_lite.vision.rendering import Scene, render_restless, render_video
 from vidsindy_lite.vision.tracking import LEAST, Detection, check_detector, link, track
 from vidsindy_lite.vision.video import write_video
 
@@ -148,11 +144,7 @@ def drifting(n):
 
 
 @pytest.mark.parametrize(
-    ("background", "motion", "light"),
-    [
-        ("bricks", shaking, 0.0),
-        ("wood", drifting, 0.1),
-    ],
+    ("background", "motion", "light"), [("bricks", shaking, 0.0), ("wood", drifting, 0.1)]
 )
 def test_auto_takes_out_the_motion_of_the_camera_and_of_the_light(
     tmp_path, background, motion, light
@@ -163,10 +155,7 @@ def test_auto_takes_out_the_motion_of_the_camera_and_of_the_light(
     path = write_video(tmp_path / "clip.mov", render_restless(truth, scene, shifts, light))
     found = track(path)
     assert found.detector == "motion"
-    for pixels, places in (
-        (found.pixels, truth + shifts - shifts[0]),
-        (found.in_frames, truth),
-    ):
+    for pixels, places in ((found.pixels, truth + shifts - shifts[0]), (found.in_frames, truth)):
         error = np.linalg.norm(pixels - places, axis=1)
         assert np.isfinite(error).mean() >= 0.95
         assert np.nanmedian(error) < 0.5

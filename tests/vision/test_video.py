@@ -259,10 +259,7 @@ def test_the_view_of_a_turned_camera_is_upright(tmp_path, quarters):
 
 @pytest.mark.parametrize(
     ("name", "codec", "pixels", "options"),
-    [
-        ("a.mkv", "ffv1", "bgr0", {}),
-        ("b.mp4", "libx264", "yuv420p", {"bf": "3", "g": "8"}),
-    ],
+    [("a.mkv", "ffv1", "bgr0", {}), ("b.mp4", "libx264", "yuv420p", {"bf": "3", "g": "8"})],
 )
 def test_one_frame_is_that_of_all_whatever_the_times(tmp_path, name, codec, pixels, options):
     times = np.cumsum(np.random.default_rng(0).integers(5, 60, 60)) / 1000

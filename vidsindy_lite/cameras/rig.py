@@ -58,15 +58,7 @@ from ..checks import (
     check_vector,
     shown,
 )
-from ..storage import (
-    TREES,
-    check_file,
-    read_arrays,
-    read_text,
-    read_tree,
-    reading,
-    write_file,
-)
+from ..storage import TREES, check_file, read_arrays, read_text, read_tree, reading, write_file
 from .models import (
     LENS,
     MODELS,

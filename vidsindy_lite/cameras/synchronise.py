@@ -100,10 +100,7 @@ def promising_lags(footage: Footage, cameras: Sequence[Camera]) -> list[list[flo
 
 
 def lag_misses(
-    footage: Footage,
-    cameras: Sequence[Camera],
-    most: int = INSTANTS,
-    shift: bool = False,
+    footage: Footage, cameras: Sequence[Camera], most: int = INSTANTS, shift: bool = False
 ) -> Iterator[tuple[Floats, Floats]]:
     """Of each camera but the first calibrated one, all whole lags (k,) and `pair_missed` at these.
 

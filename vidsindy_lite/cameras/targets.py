@@ -232,9 +232,7 @@ def _surest(count: int, misfit: Callable[[list[int]], float]) -> tuple[float, li
     return second / max(ranked[0][0], 1e-9), ranked[0][1]
 
 
-def _on_from(
-    before: Sequence[_Run], after: Sequence[_Run], cameras: Rig
-) -> tuple[list[int], bool]:
+def _on_from(before: Sequence[_Run], after: Sequence[_Run], cameras: Rig) -> tuple[list[int], bool]:
     """In which order the targets go on behind a gap in all views, and whether that is sure."""
     start = _first(after)
     there, x = _in_space(before, cameras)

@@ -21,12 +21,7 @@ from ..arrays import Bools, Floats, Ints
 from .collocation import CLEANEST, Fit, Linearisation, State, Status
 from .data import Trajectory, autocovariances, typical_step
 from .frames import closed, free_offsets, freed, laws_at
-from .l0 import (
-    LEAST,
-    far_neighbours,
-    newcomers,
-    prior_penalties,
-)
+from .l0 import LEAST, far_neighbours, newcomers, prior_penalties
 from .library import monomial_exponents, monomials, shift_matrix, velocity_names
 from .mechanics import Complexes, Round, on_circle, on_sphere
 from .model import PolynomialSystem, place, spoken, sum_text
@@ -536,11 +531,7 @@ def elsewhere(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[Riv
 
 
 def pinned(
-    problem: Problem,
-    state: State,
-    model: Linearisation,
-    law: PolynomialSystem,
-    tolerated: float,
+    problem: Problem, state: State, model: Linearisation, law: PolynomialSystem, tolerated: float
 ) -> Iterator[Rival]:
     """Axes that may as well be free, a little off the data's, by which the law had other terms.
 
@@ -584,11 +575,7 @@ def untold_origins(found: Sequence[Rival], remedy: str) -> Iterator[str]:
 
 
 def diagnose(
-    problem: Problem,
-    fit: Fit,
-    model: Linearisation,
-    path: Path,
-    law: PolynomialSystem,
+    problem: Problem, fit: Fit, model: Linearisation, path: Path, law: PolynomialSystem
 ) -> tuple[str, ...]:
     """Reasons not to trust a law.
 

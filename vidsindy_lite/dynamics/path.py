@@ -29,14 +29,7 @@ from ..arrays import Bools, Floats
 from .bspline import Segment
 from .collocation import Fit, State, Status
 from .data import Trajectory
-from .frames import (
-    Origin,
-    cheapest,
-    closed,
-    free_offsets,
-    with_fewer_axes,
-    with_free_axis,
-)
+from .frames import Origin, cheapest, closed, free_offsets, with_fewer_axes, with_free_axis
 from .l0 import NEGLIGIBLE, inverse, minimiser, subset_path, subset_search
 from .model import PolynomialSystem, runge_kutta_4
 from .noise import (

@@ -25,38 +25,14 @@ from ..checks import check_choice, check_integer, check_positive, shown
 from ..progress import bar
 from .bspline import DEGREE
 from .collocation import Fit
-from .data import (
-    Trajectory,
-    check_sigma,
-    check_systematic,
-    check_trajectories,
-    coordinate_names,
-)
+from .data import Trajectory, check_sigma, check_systematic, check_trajectories, coordinate_names
 from .diagnostics import diagnose, is_on_circle
 from .inference import infer, with_errors
-from .library import (
-    Library,
-    check_library,
-    monomial_exponents,
-    monomials,
-)
+from .library import Library, check_library, monomial_exponents, monomials
 from .model import Form
 from .noise import TOLERATED, rebalanced, smoother_weights, views, with_process_noise
-from .orientation import (
-    Measured,
-    Solved,
-    check_orientation,
-    in_axes,
-    in_sparsest_axes,
-    with_turns,
-)
-from .path import (
-    ROUNDS,
-    first_law,
-    information_criterion,
-    near,
-    persistent,
-)
+from .orientation import Measured, Solved, check_orientation, in_axes, in_sparsest_axes, with_turns
+from .path import ROUNDS, first_law, information_criterion, near, persistent
 from .problem import Problem, pose
 from .result import LIBRARY, NAME, Discovery, History, Path, Swing, swinging
 
