@@ -55,7 +55,14 @@ import numpy as np
 import torch
 from scipy.spatial.transform import Rotation
 
-from vidsindy_lite import Rig, cameras, discover_from_tracks, learn_cameras, reconstruct, residuals
+from vidsindy_lite import (
+    Rig,
+    cameras,
+    discover_from_tracks,
+    learn_cameras,
+    reconstruct,
+    residuals,
+)
 from vidsindy_lite.companion.artifacts import save_figure, save_slider, save_table, versions
 from vidsindy_lite.study import (
     REFERENCE_OFFSET,

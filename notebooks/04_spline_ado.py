@@ -56,7 +56,14 @@ from tqdm import tqdm
 # %%
 from vidsindy_lite import discover, dynamics
 from vidsindy_lite.companion.artifacts import save_figure, save_slider, save_table, versions
-from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, plots, score, spline_ado
+from vidsindy_lite.study import (
+    REFERENCE_OFFSET,
+    SYSTEMS,
+    add_noise,
+    plots,
+    score,
+    spline_ado,
+)
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"

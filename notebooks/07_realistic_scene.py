@@ -65,7 +65,15 @@ from vidsindy_lite import (
     write_video,
 )
 from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
-from vidsindy_lite.study import LEAST, REFERENCE_OFFSET, SYSTEMS, plots, pulls, score, significant
+from vidsindy_lite.study import (
+    LEAST,
+    REFERENCE_OFFSET,
+    SYSTEMS,
+    plots,
+    pulls,
+    score,
+    significant,
+)
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"

@@ -15,6 +15,7 @@ from vidsindy_lite import study
 from vidsindy_lite.companion.report import check_folder_is_free
 from vidsindy_lite.storage import PACKAGE
 from vidsindy_lite.study import add_noise
+from vidsindy_lite.study.corruption import kicked_path
 from vidsindy_lite.vision import render
 
 GUIDE = (PACKAGE.parent / "docs" / "guide.md").read_text(encoding="utf-8")
@@ -120,15 +121,12 @@ def oscillation(step, count, noise):
     return told(vl.discover, t, add_noise(x, noise, np.random.default_rng(0)), degree=1)
 
 
-def driven(studio):
-    """A spring pushed by cos(.85 t), at eight samples a turn."""
-    t = np.arange(80) * 2 * np.pi / 0.85 / 8
-    swing = solve_ivp(
-        lambda t, x: [x[1], np.cos(0.85 * t) - x[0] - 0.1 * x[1]], (0, t[-1]), [1, 0], t_eval=t,
-        rtol=1e-9,
-    )  # fmt: skip
-    x = add_noise(swing.y[:1].T, 0.05, np.random.default_rng(0))
-    return told(vl.discover, t, x)
+def kicked(studio):
+    """A spring that is kicked at random, for five turns."""
+    law = vl.PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1, "y": -0.1}}, degree=3)
+    rng, t = np.random.default_rng(3), np.linspace(0, 10 * np.pi, 500)
+    x = kicked_path(law, t, (1.0, 0.0), (0.0, 0.2), rng)[:, :1]
+    return told(vl.discover, t, x + 0.01 * x.std() * rng.standard_normal(x.shape), order=2)
 
 
 def undecided(studio):
@@ -219,7 +217,7 @@ TROUBLES = {
     "a sample lies far from those before and after it": jumping,
     "turns of the motion": lambda studio: oscillation(0.01, 200, 0.05),
     "sample faster": lambda studio: oscillation(1.3, 200, 0.02),
-    "from a drive or a force that nobody named": driven,
+    "from a drive or a force that nobody named": kicked,
     "must hold no files of the names": occupied,
     "explains it": swapped,
 }
