@@ -208,10 +208,10 @@ def _fit(
             return None
         miss = shown - gain * key - offset
         if step == 0:
-            offset = np.median(miss[known][::2])
+            offset = float(np.median(miss[known][::2]))
             miss -= offset
         # Grey levels; a deviation without any noise.
-        spread = max(1.4826 * np.median(np.abs(miss[known])[::2]), 0.3)
+        spread = max(1.4826 * float(np.median(np.abs(miss[known])[::2])), 0.3)
         bound = max(3 * spread, loose / 2**step)
         weight = share * known / (1 + (miss / bound) ** 2) ** 2
         heavy = steep * weight.ravel()
