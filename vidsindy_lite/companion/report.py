@@ -35,7 +35,7 @@ from ..checks import check_path
 from ..dynamics import Discovery, Quantity, Swing
 from ..pipeline import Refused, Stopped, VideoDiscovery
 from ..progress import bar
-from ..storage import write_files
+from ..storage import write_file, write_files
 from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
 from ..values import as_json
 from ..vision import VideoInfo, pick_frames, read_frame, video_info
@@ -547,7 +547,7 @@ def write_pick_page(paths: Sequence[str | os.PathLike], out: str | os.PathLike) 
     """
     out = check_page("out", out, "pick.html")
     text = page("pick.html", videos=[_video(Path(path)) for path in paths])
-    write_files({out: text.encode()})
+    write_file(out, text.encode())
     return out
 
 
