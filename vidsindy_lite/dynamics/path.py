@@ -311,9 +311,8 @@ def deepest(
     """The path around the last of the richer laws that explain what the one before left over.
 
     A missing term leaves smooth errors, too, and only its own law tells: so the error that is
-    tolerated is lowered as long as the errors of single samples fall with it. That smooth errors
-    fall alone is no sign: any term that lasts as long takes some of them. At ``most`` so many laws,
-    the error that is tolerated falling by ``descent`` from one to the next.
+    tolerated is lowered as long as that pays (`_explains`). At ``most`` so many laws, the error
+    that is tolerated falling by ``descent`` from one to the next.
     """
     for _ in range(most):
         errors = errors_left(problem, path.fit)
@@ -326,12 +325,22 @@ def deepest(
         fit = select(tolerant, start, FINAL_WEIGHT, "a smaller error", history)
         fit = at_own_errors(problem, framed(tolerant, fit, history))
         richer = fit.state.active.sum() > 2 * path.fit.state.active.sum()
-        before, after = (typical(residual_noise(one)) for one in (path.fit, fit))
-        explained = after < before / CONSISTENT
-        if fit.status is not Status.CONVERGED or richer or not explained:
+        if fit.status is not Status.CONVERGED or richer or not _explains(problem, path.fit, fit):
             break  # around what has not converged nothing is told
         path = follow(problem, fit)
     return path
+
+
+def _explains(problem: Problem, before: Fit, after: Fit) -> bool:
+    """Whether what a law takes of the errors of single samples is worth its terms.
+
+    Of errors that last, with that law, any term takes some: only so many samples count as have
+    independent errors.
+    """
+    one, two = residual_noise(before), residual_noise(after)
+    independent = after.collocation.counts * (two / effective_noise(after)) ** 2
+    gain = independent @ np.log((one / two) ** 2)
+    return bool(gain > problem.penalty(after.state) - problem.penalty(before.state))
 
 
 def at_own_errors(problem: Problem, fit: Fit) -> Fit:
