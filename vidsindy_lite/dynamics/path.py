@@ -335,12 +335,13 @@ def _explains(problem: Problem, before: Fit, after: Fit) -> bool:
     """Whether what a law takes of the errors of single samples is worth its terms.
 
     Of errors that last, with that law, any term takes some: only so many samples count as have
-    independent errors.
+    independent errors, and the evidence has to be strong (2 log of the odds above 6: Kass, Raftery
+    1995).
     """
     one, two = residual_noise(before), residual_noise(after)
     independent = after.collocation.counts * (two / effective_noise(after)) ** 2
     gain = independent @ np.log((one / two) ** 2)
-    return bool(gain > problem.penalty(after.state) - problem.penalty(before.state))
+    return bool(gain > problem.penalty(after.state) - problem.penalty(before.state) + 6)
 
 
 def at_own_errors(problem: Problem, fit: Fit) -> Fit:
