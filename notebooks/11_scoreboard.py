@@ -156,12 +156,15 @@ if full:
     assert rate["Gauss-Newton"]["stored"] > rate.drop(columns="Gauss-Newton").loc["stored"].max() + 0.05
     assert (rate["Gauss-Newton"] > rate.PySINDy + 0.1).all()
     assert (laws.groupby("condition")["wrong, ok"].sum() <= 7).all()
-    assert (abs(rate.loc["exact", list(both)] - rate.loc["stored", list(both)]) < 0.05).all()
+    cost = len(cubic) * (rate.loc["exact", list(both)] - rate.loc["stored", list(both)])
+    assert (abs(cost) < 2.5).all()
+    ours = laws[(laws.method == "Gauss-Newton") & (laws.condition == "stored")]
+    assert not ours["wrong, ok"].any()
 
 # %% [markdown]
 # Least squares finds about half of these laws even without errors: a threshold on coefficients keeps what is large,
-# not what is needed. The smooth error of the stored integration, of the order of $10^{-4}$, costs neither method a law.
-# It looks like small terms to a solver that takes errors for white noise; Gauss-Newton looks for the law that *persists* while more and more error is tolerated ([notebook 04b](04b_the_search.ipynb)); `found.plot_path()`
+# not what is needed. The smooth error of the stored integration, of the order of $10^{-4}$, costs each method two laws
+# at most, and what Gauss-Newton finds in their place comes with a doubt. It looks like small terms to a solver that takes errors for white noise; Gauss-Newton looks for the law that *persists* while more and more error is tolerated ([notebook 04b](04b_the_search.ipynb)); `found.plot_path()`
 # draws that.
 
 # %%
