@@ -324,8 +324,7 @@ def deepest(
         start = replace(path.fit, collocation=weighted)
         fit = select(tolerant, start, FINAL_WEIGHT, "a smaller error", history)
         fit = at_own_errors(problem, framed(tolerant, fit, history))
-        richer = fit.state.active.sum() > 2 * path.fit.state.active.sum()
-        if fit.status is not Status.CONVERGED or richer or not _explains(problem, path.fit, fit):
+        if fit.status is not Status.CONVERGED or not _explains(problem, path.fit, fit):
             break  # around what has not converged nothing is told
         path = follow(problem, fit)
     return path
