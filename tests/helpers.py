@@ -12,8 +12,7 @@ import pytest
 
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics.library import Library
-from vidsindy_lite.dynamics.model import Form
-from vidsindy_lite.dynamics.problem import pose
+from vidsindy_lite.dynamics.solver import _solved, _Task
 from vidsindy_lite.vision.candidates import Candidates
 
 REAL = Path(vl.__file__).parents[2] / "shared" / "real"
@@ -96,14 +95,12 @@ def scene(seed, n=500, cameras=3):
     return x, rig, [camera.project(x) for camera in rig.cameras], rng
 
 
-def posed(noise=0.0, seen=slice(None)):
-    """A small wave about (3, 0), as a discovery's problem; noise in parts of its amplitudes."""
-    t = np.linspace(0, 20, 401)
-    x = np.stack([3 + 2 * np.sin(t), 0.1 * np.cos(t)], axis=1)
-    x += noise * np.array([2, 0.1]) * np.random.default_rng(0).normal(size=x.shape)
-    t, x = t[seen], x[seen]
-    form = Form.of(("x", "y"), Library.polynomial(2))
-    return pose([(t, x)], [np.ones((len(t), 2, 1))], form, rng=np.random.default_rng(0))
+def solved(t, x, degree):
+    """What is found of one motion by a law of first order, its problem and its fit."""
+    measured = [(t, x)], [np.zeros((*x.shape, 0))], None
+    names, library = tuple("xyz"[: x.shape[1]]), Library.polynomial(degree)
+    task = _Task(measured, names, library, "learn", 0, False, np.inf)
+    return _solved(task, task.form(1))
 
 
 def filmed(motion, frames, lags, rates=(1, 1, 1), noise=0.05):

@@ -115,13 +115,3 @@ def test_check_gate_fails(tmp_path, old, new, problem):
     path.write_text(CELLS.replace(old, new))
     assert all(problem in found for found in check_problems(path))
     assert bool(check_problems(path)) == bool(problem)
-
-
-def test_an_answer_that_is_wrong_is_seen(tmp_path):
-    path = tmp_path / "01_first.py"
-    path.write_text(CELLS.replace("answer = 2", "answer = 3"))
-    with pytest.raises(AssertionError):
-        run_cells(jupytext.read(path), 0)
-    path.write_text(CELLS)
-    with pytest.raises(NameError, match="answer"):
-        run_cells(exercise(path), 0)

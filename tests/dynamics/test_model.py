@@ -8,8 +8,6 @@ from hypothesis import strategies as st
 from vidsindy_lite.dynamics.data import (
     check_trajectories,
     check_trajectory,
-    cut,
-    typical_step,
     variable_names,
 )
 from vidsindy_lite.dynamics.library import monomial_exponents
@@ -146,16 +144,6 @@ def test_a_circle_is_closed_whatever_the_times(t):
     np.testing.assert_allclose(path, np.stack([np.sin(t), np.cos(t)], axis=1), atol=3e-10)
 
 
-def test_the_tolerance_is_met():
-    t = np.linspace(0, 10, 11)
-    errors = [
-        np.abs(integrate(circle, t, np.array([0.0, 1.0]), tolerance)[0][:, 0] - np.sin(t)).max()
-        for tolerance in (1e-5, 1e-11)
-    ]
-    assert 1e-3 > errors[0] > 1e-8
-    assert 1e-9 > errors[1] > 0
-
-
 def test_what_ends_a_path_is_told_and_after_it_there_is_nothing():
     t = np.linspace(0, 2, 21)  # 1 / (1 - t)
     path, end = integrate(lambda x: x**2, t, np.array([1.0]), farthest=1e6)
@@ -224,35 +212,8 @@ def test_missing_and_masked_rows_are_left_out():
         assert (x == X[:4]).all()
 
 
-@pytest.mark.parametrize("t", [[1, 2], T, (T, X), [(T, X, X)], None])
-def test_what_is_no_list_of_trajectories(t):
-    with pytest.raises(ValueError, match=r"x: must be given, unless t is a list of pairs \(t, x\)"):
+@pytest.mark.parametrize("t", [[1, 2], T, (T, X), [(T, X, X)], None, [], [(T, X), (T, X[:, :1])]])
+def test_what_is_no_list_of_trajectories_of_one_system(t):
+    given = r"x: must be given, unless t is a list of pairs \(t, x\)"
+    with pytest.raises(ValueError, match=f"{given}|t: a list of trajectories must hold at least"):
         check_trajectories(t)
-
-
-@pytest.mark.parametrize("pairs", [[], [(T, X), (T, X[:, :1])]])
-def test_trajectories_of_one_system(pairs):
-    with pytest.raises(ValueError, match="t: a list of trajectories must hold at least one, all"):
-        check_trajectories(pairs)
-
-
-def test_rows_of_several_trajectories_count_for_what_was_seen_in_them():
-    x = with_value(2, np.nan)
-    x[3] = np.nan
-    ((t, left),) = check_trajectories(T, x)
-    assert t.tolist() == [0, 1, 2, 4]
-    assert np.isnan(left[2]).tolist() == [False, True]
-
-
-def test_a_coordinate_that_pauses_cuts():
-    t = np.arange(10.0)
-    x = np.stack([t, np.where((t > 1) & (t < 6), np.nan, t)], axis=1)
-    assert [piece[0].tolist() for piece in cut((t, x), 2.5)] == [[0, 1], [6, 7, 8, 9]]
-    assert [piece[0].tolist() for piece in cut((t, x), np.array([2.5, 5]))] == [t.tolist()]
-
-
-def test_cut_at_long_steps_and_nowhere_else():
-    t = np.array([0.0, 1, 2, 5, 6, 9])
-    pieces = cut((t, t[:, None]), longest_step=2.0)
-    assert [piece[0].tolist() for piece in pieces] == [[0, 1, 2], [5, 6], [9]]
-    assert typical_step(pieces) == 1.0

@@ -179,16 +179,6 @@ def test_the_swing_is_printed_and_kept(swung, tmp_path):
     np.testing.assert_allclose(kept.law.predict([0.5, 0.1]), swung.swing.law.predict([0.5, 0.1]))
 
 
-def test_errors_that_last_do_not_hide_a_circle():
-    rng, errors = np.random.default_rng(5), np.zeros((len(FRAMES), 2))
-    for i in range(1, len(FRAMES)):
-        errors[i] = 0.78 * errors[i - 1] + 0.0015 * np.sqrt(1 - 0.78**2) * rng.standard_normal(2)
-    found = vl.discover(FRAMES, flat(swung_bob(0.5, 0.0003)) + errors, degree=2)
-    assert found.status == "suspect"
-    assert any("stays on a circle" in text for text in found.warnings)
-    assert found.swing is not None
-
-
 def swing_of(runs, shared=None):
     """What is found where a motion is known to be on a circle."""
     none = [np.empty((*x.shape, 0)) for _, x in runs]

@@ -147,22 +147,6 @@ def test_the_table_of_the_ablation_counts_what_is_lost_and_gained():
 # ------------------------------------------------------------------------------ what others print
 
 
-def test_odebench_is_complete():
-    assert list(ODEBENCH) == list(range(1, 64))
-    dimensions = [len(one.starts[0]) for one in ODEBENCH.values()]
-    assert [dimensions.count(d) for d in (1, 2, 3, 4)] == [23, 28, 10, 2]
-    degrees = [e.law.exponents.sum(axis=1).max() for e in ODEBENCH.values() if e.law is not None]
-    assert (len(degrees), sum(one.is_cubic for one in ODEBENCH.values())) == (37, 35)
-    assert len({equation.name for equation in ODEBENCH.values()}) == 63
-    for equation in ODEBENCH.values():
-        assert len(set(equation.starts)) == 2
-        for start in equation.starts:
-            rate = equation.rate(np.array(start))
-            assert rate.shape == (len(start),)
-            assert np.isfinite(rate).all()
-            assert rate.any()
-
-
 def allee(x):
     return 0.14 * x * (1 - x / 130) * (x / 4.4 - 1)
 

@@ -230,15 +230,6 @@ def test_a_planted_file_is_read_and_never_executed(cache, monkeypatch, result):
     assert not (cache / "planted").exists()
 
 
-@pytest.mark.slow
-def test_error_names_the_task_and_what_was_finished_stays(clone):
-    error = clone.fail([[1, 0.0], [2, 0.0], [-3, 1.0], [4, 60.0], [5, 60.0]])
-    assert error.endswith(
-        "TaskError: square(Task(number=-3, pause=1.0)) raised ArithmeticError: below zero"
-    )
-    assert set(clone.stored()) == {1, 2}
-
-
 # --------------------------------------------------------------------------------------- a cluster
 
 CLUSTER = """\
