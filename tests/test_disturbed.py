@@ -3,18 +3,11 @@
 Assertions of a notebook have to test what it says, not the numbers of its default: each has two
 other settings. One of a small one runs with all tests, the rest by `pytest -m thorough`.
 
-Disturbed are every track and trajectory, by `disturbed/sitecustomize.py`, in every process that has
-its folder on PYTHONPATH. The full profile is disturbed in the same way, in a copy of the repository
-whose figures are then compared:
+Each run of all tests disturbs tracks and trajectories of the quick notebooks, see `test_notebooks`.
+So is the full profile, in a copy of the repository whose figures are then compared:
 
     VIDSINDY_DISTURB=1e-9:1 PYTHONPATH=tests/disturbed make figures FORCE=1
     python -m vidsindy_lite compare figures ../copy/figures
-
-and so is a run with another kernel of OpenBLAS or other threads (OPENBLAS_CORETYPE=Haswell,
-OMP_NUM_THREADS=2), with VIDSINDY_CACHE set to a folder of its own.
-
-Each run of all tests disturbs the quick notebooks once, see `test_notebooks`; `pytest -m thorough`
-does it twice more.
 """
 
 import pytest
