@@ -143,18 +143,14 @@ def test_four_marks_of_a_rectangle_that_is_seen_askew():
         ({"length": STICK, "corners": 3}, "corners: must not be given with length"),
         ({"length_error": 2}, "length_error: must be a share"),
         ({"fps": 0}, "fps: must be positive"),
+        ({"length": STICK}, "fps: must be given"),
     ],
 )
 def test_what_is_no_scale_is_refused(monkeypatch, given, message):
-    filmed(monkeypatch, pixels_of(flight()[1]))
+    rate = 0.0 if given == {"length": STICK} else 30.0
+    filmed(monkeypatch, pixels_of(flight()[1]), fps=rate)
     with pytest.raises(ValueError, match=message):
         vl.discover_from_video("throw.mp4", **given)
-
-
-def test_a_film_without_a_rate_needs_one(monkeypatch):
-    filmed(monkeypatch, pixels_of(flight()[1]), fps=0.0)
-    with pytest.raises(ValueError, match="fps: must be given"):
-        vl.discover_from_video("throw.mp4", STICK)
 
 
 # ---------------------------------------------------------------------------------------- the whole

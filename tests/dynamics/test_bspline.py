@@ -62,15 +62,6 @@ def test_at_a_kink_the_curve_is_continuous_and_its_slope_is_not():
 # ---------------------------------------------------------------------------------------- smoothing
 
 
-@pytest.mark.parametrize("sigma", [1e-3, 0.5])
-def test_noise_is_estimated_over_three_decades(sigma):
-    t = np.linspace(0, 20, 800)
-    x = np.stack([np.sin(t), np.cos(1.7 * t) + 0.3 * t], axis=1)
-    noisy = x + sigma * np.random.default_rng(3).normal(size=x.shape)
-    estimate = smooth([(t, noisy)], np.random.default_rng(0)).noise
-    np.testing.assert_allclose(estimate, sigma, rtol=0.1)
-
-
 def test_few_samples_have_a_smoothing_spline_of_scipys():
     rng = np.random.default_rng(4)
     t = np.cumsum(rng.uniform(0.5, 1.5, 22))

@@ -41,19 +41,6 @@ def test_a_pendulum_at_a_large_amplitude_is_found_from_its_angle_alone(friction,
     assert found.status == "ok"
 
 
-def test_a_law_of_first_order_may_have_functions_too():
-    law = PolynomialSystem.from_terms(
-        {"x": {"sin(y)": 1.0, "x": -0.3}, "y": {"cos(x)": 2.0, "1": 0.5}}, library=Library.fourier()
-    )
-    t = np.linspace(0, 30, 600)
-    x = law.simulate(t, [1.0, 0.0])
-    x += 0.01 * x.std(axis=0) * np.random.default_rng(0).normal(size=x.shape)
-    found = vl.discover(t, x, library=Library.polynomial(1) + Library.fourier(1))
-    assert found.system.text().splitlines() != law.text().splitlines()
-    wanted = {(law.terms[k], j) for k, j in np.argwhere(law.support)}
-    assert {(found.terms[k], j) for k, j in np.argwhere(found.system.support)} == wanted
-
-
 def speed(vx, vy, vz):
     return np.sqrt(vx**2 + vy**2 + vz**2)
 

@@ -46,15 +46,13 @@ def test_a_turned_law_is_found_in_its_own_axes(tmp_path):
 
 
 def test_springs_that_stand_askew_are_found_along_themselves():
-    names = {"x": "vx", "y": "vy", "z": "vz"}
-    springs = {f"v{name}": {name: -k} for name, k in zip(names, (1.0, 1.7, 2.3), strict=True)}
-    law = vl.PolynomialSystem.from_terms({n: {v: 1} for n, v in names.items()} | springs)
+    springs = {"x": {"vx": 1}, "y": {"vy": 1}, "vx": {"x": -1.0}, "vy": {"y": -1.7}}
     t, rng = np.linspace(0, 30, 500), np.random.default_rng(0)
-    x = law.simulate(t, [1, 0.2, 0.5, 0.1, 0.8, -0.5])[:, :3]
-    axes = Rotation.random(random_state=rng).as_matrix()
+    x = vl.PolynomialSystem.from_terms(springs).simulate(t, [1, 0.2, 0.1, 0.8])[:, :2]
+    axes = Rotation.from_euler("z", 0.5).as_matrix()[:2, :2]
     seen = x @ axes + 0.02 * x.std() * rng.normal(size=x.shape)
     found = vl.discover(t, seen, degree=1, order=2, orientation="learn")
-    assert found.native.support[:, 3:].sum() == 3
+    assert found.native.support[:, 2:].sum() == 2
     assert apart(found.orientation, axes) < np.deg2rad(1)
 
 

@@ -117,6 +117,3 @@ def test_a_plateau_that_leaves_more_than_it_was_said_to_is_passed_over():
     found = discover(t[seen], x[seen], order=1)
     assert found.terms[np.flatnonzero(found.system.support[:, 0])[-1]] == "x^2"
     assert found.noise < 1e-3 * x.std()
-
-
-# ------------------------------------------------------------------------------------- across gaps

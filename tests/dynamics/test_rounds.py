@@ -44,17 +44,6 @@ def test_the_errors_cover_in_space():
     assert nine.radius_error > 1.7 * one.radius_error
 
 
-def test_whirling_has_no_leaps_and_what_is_missing_has_no_angle():
-    whirl = 4 * TIMES
-    x = bob(whirl)[:, [0, 2]]
-    x[100:120] = np.nan
-    circle = vl.on_circle(x / [0.6, 1.0], zero=(0, -1))
-    seen = np.isfinite(circle.angle)
-    assert seen.sum() == 380
-    assert np.diff(circle.angle[seen]).max() < 21 * 4 * TIMES[1] + 1e-9
-    assert abs(np.ptp(circle.angle[seen])) == pytest.approx(40, rel=1e-6)
-
-
 def test_a_sphere_has_two_angles():
     second = 0.5 * np.sin(2.1 * TIMES)
     x = 1.5 * np.stack(

@@ -122,16 +122,6 @@ def test_what_was_seen_in_a_row_counts(missing, noise):
     assert found.status == "ok"
 
 
-def test_several_trajectories_share_one_law():
-    truth = SYSTEMS["Lorenz"]
-    rng = np.random.default_rng(3)
-    t = np.arange(250) * 0.015
-    runs = [truth.simulate(t, x0) for x0 in ((-8, 7, 27), (5, 5, 25), (1, -6, 20))]
-    found = discover([(t, add_noise(x, 0.02, rng)) for x in runs])
-    assert score(found, truth).exact
-    assert len(found.curves) == 3
-
-
 def test_units_do_not_matter():
     truth, t, x = measured("SprottE", 0.05, n=400)
     found = discover(t, x)
