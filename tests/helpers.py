@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics.library import Library
@@ -57,6 +58,22 @@ def trajectory(rng, n):
         rng.normal(size=3) / k * np.sin(k * t + rng.uniform(0, 2 * np.pi, 3)) for k in range(1, 6)
     )
     return rng.normal(scale=5, size=3) + rng.uniform(1, 100) * waves
+
+
+def moving(acceleration, x0, v0, t):
+    """Positions of a motion, (n, m)."""
+    m = len(x0)
+
+    def rate(_, state):
+        return np.append(state[m:], acceleration(state[:m], state[m:]))
+
+    start = np.append(x0, v0).astype(float)
+    return solve_ivp(rate, (t[0], t[-1]), start, t_eval=t, rtol=1e-10, atol=1e-11).y[:m].T
+
+
+def noisy(x, share, seed=0):
+    """Values with errors of a share of the spread of each column."""
+    return x + share * x.std(axis=0) * np.random.default_rng(seed).normal(size=x.shape)
 
 
 def dependent(rng, n, memory):

@@ -11,7 +11,6 @@ from scipy.optimize import approx_fprime
 
 from vidsindy_lite.dynamics.bspline import (
     PENALTIES,
-    Grid,
     Segment,
     clamped_knots,
     design_matrix,
@@ -39,22 +38,6 @@ def test_agrees_with_scipy(count, order, seed):
 def test_bad_breakpoints_are_refused(breakpoints):
     with pytest.raises(ValueError, match="breakpoints: must be at least two increasing"):
         clamped_knots(breakpoints)
-
-
-def test_at_a_kink_the_curve_is_continuous_and_its_slope_is_not():
-    t = np.linspace(0, 3, 40)
-    x = np.abs(t - 1.3)[:, None]
-    segment = Segment.even(t, x, 0.3, 0, np.array([-1.0, 1.3, 3.0])).refined()
-    assert segment.kinks.tolist() == [1.3]
-    grid = Grid.of([segment])
-    assert grid.nodes.shape[0] == grid.r - 1  # as many equations as without: all but the start
-    control = np.linalg.lstsq(grid.samples.toarray(), x, rcond=None)[0]
-    (spline,) = grid.splines(control)
-    fine = np.linspace(0, 3, 333)
-    np.testing.assert_allclose(spline(fine)[:, 0], np.abs(fine - 1.3), atol=1e-10)
-    slopes = grid.slopes @ control
-    np.testing.assert_allclose(np.abs(slopes), 1, atol=1e-8)
-    assert (np.diff(slopes[:, 0]) > 1).sum() == 1
 
 
 # -------------------------------------------------------------------------------------------- bands

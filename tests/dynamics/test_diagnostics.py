@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import solved
-from scipy.integrate import solve_ivp
+from helpers import moving, noisy, solved
 from scipy.interpolate import make_interp_spline
 
 from vidsindy_lite.dynamics import discover
@@ -176,12 +175,7 @@ WORDS = "terms that the law has not explain what it leaves"
 
 def swung(pull, start):
     """Positions of a body that a law of second order moves."""
-    rate = lambda _, s: [s[1], pull(s[0], s[1])]  # noqa: E731
-    return solve_ivp(rate, (0, TIMES[-1]), [start, 0], t_eval=TIMES, rtol=1e-9, atol=1e-10).y[:1].T
-
-
-def noisy(x, share, seed=0):
-    return x + share * x.std() * np.random.default_rng(seed).standard_normal(x.shape)
+    return moving(pull, [start], [0], TIMES)
 
 
 @pytest.mark.parametrize(

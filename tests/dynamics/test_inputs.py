@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers import noisy
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
@@ -27,10 +28,6 @@ def duffing(t=T, start=(0.5, 0.0), push=lambda t, x: force(t)):
 
 FORCED = duffing()
 U = Library.inputs(T, {"u": force(T)})
-
-
-def noisy(x, noise, seed=0):
-    return x + noise * x.std(axis=0) * np.random.default_rng(seed).standard_normal(x.shape)
 
 
 def terms(law, equation):

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vidsindy_lite.dynamics.inference import _pruned
-from vidsindy_lite.dynamics.l0 import closest_rival, inverse, subset_path, subset_search
+from vidsindy_lite.dynamics.l0 import closest_rival, inverse, subset_search
 from vidsindy_lite.dynamics.library import monomial_exponents
 
 
@@ -57,19 +57,6 @@ def test_the_closest_rival_may_have_no_term_in_common():
     swapped = objective(information, pull, penalty, ~support)
     own = objective(information, pull, penalty, support)
     assert cost == pytest.approx(swapped - own, abs=1e-6)
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(2, 8), st.floats(0.1, 100))
-def test_a_path_is_a_search_of_each_share_that_begins_where_the_last_ended(seed, m, price):
-    information, pull, rng = random_problem(seed, m)
-    penalty, present, support = price * rng.uniform(0.5, 2, m), rng.standard_normal(m), np.ones(m)
-    penalty[0], support = rng.choice([penalty[0], -np.inf]), support.astype(bool)
-    shares = np.geomspace(1, 1e-4, 9).tolist()
-    functions = [(information, pull, share) for share in shares]
-    path = subset_path(functions, present, penalty, support)
-    for share, found in zip(shares, path, strict=True):
-        support, *_ = subset_search(share * information, share * pull, present, penalty, support)
-        assert (found == support).all()
 
 
 # -- information matrices ---

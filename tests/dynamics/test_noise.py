@@ -3,29 +3,11 @@
 import numpy as np
 import pytest
 from helpers import dependent
-from scipy.signal import lfilter
 
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics import PolynomialSystem
 from vidsindy_lite.dynamics import noise as weighing
-from vidsindy_lite.dynamics.noise import inflation
 from vidsindy_lite.study.corruption import kicked_path
-
-
-def lasting(n, correlation, rng):
-    """An autoregressive error of first order, variance 1."""
-    return lfilter([np.sqrt(1 - correlation**2)], [1, -correlation], rng.standard_normal(n))
-
-
-def test_errors_are_inflated_as_they_last():
-    rng = np.random.default_rng(1)
-    np.testing.assert_array_equal(inflation([rng.standard_normal((3000, 4))]), 1.0)
-    assert inflation([lasting(3000, -0.8, rng)[:, None]])[0] == 1.0  # they alternate
-    for correlation in (0.3, 0.9):
-        expected = (1 + correlation) / (1 - correlation)  # of an autoregressive error
-        found = inflation([lasting(100_000, correlation, rng)[:, None]])[0]
-        assert found == pytest.approx(expected, rel=0.1)
-
 
 # ------------------------------------------------------------------------------- few samples a turn
 

@@ -85,7 +85,8 @@ def test_errors_that_last_widen_the_error_bars(swing):
     one, nine = discover(t, x + white), discover(t, x + smooth)
     assert score(nine, DUFFING).exact
     live = one.system.support
-    assert (nine.standard_errors[live] > 2 * one.standard_errors[live]).all()
+    wider = nine.standard_errors[live] / one.standard_errors[live]  # by the root of nine
+    assert ((wider > 2) & (wider < 4.5)).all()
 
 
 def test_times_that_are_not_exact_do_not_become_terms():

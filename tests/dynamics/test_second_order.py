@@ -4,26 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers import moving, noisy
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import PolynomialSystem
 from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.solver import better, discover
-
-
-def moving(acceleration, x0, v0, t):
-    """Positions of a motion, (n, m)."""
-    m = len(x0)
-
-    def rate(_, state):
-        return np.append(state[m:], acceleration(state[:m], state[m:]))
-
-    start = np.append(x0, v0).astype(float)
-    return solve_ivp(rate, (t[0], t[-1]), start, t_eval=t, rtol=1e-10, atol=1e-11).y[:m].T
-
-
-def noisy(x, share, seed=0):
-    return x + share * x.std(axis=0) * np.random.default_rng(seed).normal(size=x.shape)
 
 
 def duffing(x, v):

@@ -6,10 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from vidsindy_lite.dynamics import PolynomialSystem, clamped_knots, monomial_exponents, monomials
+from vidsindy_lite.dynamics import PolynomialSystem, clamped_knots, monomial_exponents
 from vidsindy_lite.study.metrics import score
-from vidsindy_lite.study.paper import SYSTEMS
-from vidsindy_lite.study.spline_ado import SplineADOSettings, _Fit, spline_ado, stridge
+from vidsindy_lite.study.spline_ado import SplineADOSettings, _Fit, spline_ado
 
 RANDOM = np.random.default_rng
 SHORT = {"pretraining": 200, "epochs": 100, "alternations": 2, "collocation_per_knot": 3}
@@ -103,24 +102,6 @@ def test_equal_seeds_give_equal_laws():
     )
     np.testing.assert_array_equal(first, again)
     assert not np.array_equal(first, other)
-
-
-def lorenz_rows():
-    truth = SYSTEMS["Lorenz"]
-    _, x = truth.trajectory(600)
-    return truth, monomials(x, truth.exponents), truth(x)
-
-
-def test_the_refit_of_stridge_is_plain_least_squares_on_all_rows():
-    truth, library, derivative = lorenz_rows()
-    rng = np.random.default_rng(0)
-    noisy = derivative + rng.standard_normal(derivative.shape)
-    found = stridge(library, noisy, rng, sparsity_weight=1e-2)
-    for column, target in zip(found.T, noisy.T, strict=True):
-        inside = np.flatnonzero(column)
-        assert 0 < len(inside) < library.shape[1]
-        expected = np.linalg.lstsq(library[:, inside], target, rcond=None)[0]
-        np.testing.assert_allclose(column[inside], expected, rtol=1e-6)
 
 
 LEAST = ("knots_per_sample", "collocation_per_knot", "pretraining", "epochs", "learning_rate")
