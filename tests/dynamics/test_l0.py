@@ -1,4 +1,4 @@
-"""Sparse regression, changes of frame, and what a law of a posed problem costs."""
+"""Sparse regression, and which terms of the frame of the data are left out."""
 
 import numpy as np
 import pytest

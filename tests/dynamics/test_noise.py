@@ -38,20 +38,16 @@ TIMES = np.linspace(0.0, 40.0, 1000)
 PATH = LAW.simulate(TIMES, [2.0, 0.0])
 
 
-def uneven(kind, rng):
-    """The path with errors of mean size .02 and more, and their standard deviations."""
-    if kind == "growing":
-        size = 0.02 + 0.1 * np.abs(PATH)
-    elif kind == "for a while":
-        size = np.where(TIMES > 28, 0.2, 0.02)[:, None] * np.ones(2)
-    elif kind == "faster":
-        size = 0.01 + 0.1 * np.abs(LAW(PATH))
-    return PATH + size * rng.standard_normal(PATH.shape), size
+UNEVEN = {
+    "growing": 0.02 + 0.1 * np.abs(PATH),
+    "for a while": np.where(TIMES > 28, 0.2, 0.02)[:, None],
+    "faster": 0.01 + 0.1 * np.abs(LAW(PATH)),
+}
 
 
-@pytest.mark.parametrize("kind", ["growing", "for a while", "faster"])
+@pytest.mark.parametrize("kind", UNEVEN)
 def test_law_is_exact_and_its_errors_are_right_and_smaller_than_by_one_variance(kind, monkeypatch):
-    x, _ = uneven(kind, np.random.default_rng(2))
+    x = PATH + UNEVEN[kind] * np.random.default_rng(2).standard_normal(PATH.shape)
     found = vl.discover(TIMES, x)
     assert (found.system.support == LAW.support).all()
     assert found.status == "ok"

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import discover
-from vidsindy_lite.pipeline import Observation, Refused
+from vidsindy_lite.pipeline import Refused
 from vidsindy_lite.study import score
 from vidsindy_lite.study import trials as experiments
 from vidsindy_lite.study.paper import REFERENCE_OFFSET, SYSTEMS
 from vidsindy_lite.study.trials import (
     SOURCES,
-    FilmResult,
     FilmTask,
     Trial,
     TrialResult,
@@ -27,29 +26,13 @@ from vidsindy_lite.study.trials import (
     trial_path,
 )
 
-FRAMES = 300
-
-
-def simulated(task):
-    """A recording without videos: the true path, pixels from nowhere."""
-    truth = SYSTEMS[task.system].shift(REFERENCE_OFFSET)
-    t, x = truth.trajectory(task.frames)
-    seen = Observation((), None, None, t, x, np.zeros((0, *x.shape)), ())
-    return FilmResult(
-        **vars(seen), task=task, truth=truth, pixel_error=(0.0,) * 3, path_error=np.zeros(3),
-        seconds=0.0, detected=(),
-    )  # fmt: skip
+FRAMES = 150
 
 
 @pytest.fixture(autouse=True)
 def nothing_of_another_test(tmp_path, monkeypatch):
     experiments._path.cache_clear()
     monkeypatch.setenv("VIDSINDY_CACHE", str(tmp_path))
-
-
-@pytest.fixture
-def no_videos(monkeypatch):
-    monkeypatch.setattr(experiments, "film_result", simulated)
 
 
 @pytest.fixture(scope="module")
@@ -164,15 +147,15 @@ def test_data_depend_on_system_condition_level_and_number_alone():
         assert not np.array_equal(replace(trial, **other).corrupt_each([x])[0], expected)
 
 
-def test_every_method_gets_the_same_data_and_the_number_as_its_seed(no_videos, monkeypatch):
+def test_every_method_gets_the_same_data_and_the_number_as_its_seed(this_film, monkeypatch):
     seen = {}
 
     def watch(method, t, x, systematic, seed):
         seen[method] = (t, x, seed)
-        return SYSTEMS["Lorenz"]
+        return SYSTEMS["SprottE"]
 
     monkeypatch.setattr(experiments, "find_law", watch)
-    trial = Trial("Lorenz", "blocks", 0.2, 1, source="truth", frames=FRAMES)
+    trial = Trial("SprottE", "blocks", 0.2, 1, source="truth", frames=FRAMES)
     methods = [replace(trial, method=method) for method in experiments.METHODS]
     assert [result.trial for result in run_trials(methods, jobs=1)] == methods
     t, x, _ = seen["Gauss-Newton"]
@@ -186,7 +169,7 @@ def test_every_method_gets_the_same_data_and_the_number_as_its_seed(no_videos, m
 # ----------------------------------------------------------------------------------------- results
 
 
-def test_result_of_gauss_newton_equals_a_direct_computation(no_videos):
+def test_result_of_gauss_newton_equals_a_direct_computation(this_film):
     trial = Trial("SprottE", "noise", 0.02, 2, source="truth", frames=FRAMES)
     truth = SYSTEMS["SprottE"].shift(REFERENCE_OFFSET)
     t, x = truth.trajectory(FRAMES)
