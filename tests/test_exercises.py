@@ -27,12 +27,9 @@ def check_problems(path):
                 problems.append(f"exercise {asked[-1]}: its check sees nothing of the answer")
             made, asked = None, asked[:-1]
     problems += [f"exercise {number}: no check" for number in asked]
-    wanted = [f"cell {i}" for i, c in enumerate(notebook.cells) if count_cell(c) > LONGEST]
-    return problems + [f"{cell}: more than {LONGEST} lines" for cell in wanted]
-
-
-def count_cell(cell):
-    return count_lines(cell.source) if cell.cell_type == "code" else 0
+    code = [(i, cell.source) for i, cell in enumerate(notebook.cells) if cell.cell_type == "code"]
+    long = [i for i, source in code if count_lines(source) > LONGEST]
+    return problems + [f"cell {i}: more than {LONGEST} lines" for i in long]
 
 
 def run_cells(notebook, seed):

@@ -1,6 +1,7 @@
 """One camera, motion in a plane: the scale and its error, and laws that are the same everywhere."""
 
 import json
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -79,6 +80,8 @@ def test_drag_is_given_where_it_is_plain_and_else_a_doubt_and_in_the_error_of_g(
     assert abs(said["drag"].value - 0.6) < 3 * said["drag"].error < 0.05
     assert abs(said["g"].value - 9.81) < 3 * said["g"].error < 0.05
     assert found.status == "ok"
+    assert [plateau.terms.sum() for plateau in found.path[3]] == [2, 1, 0]
+    assert all(low.high == high.low for low, high in pairwise(found.path[3]))
     t, x = flight(drag=0.05)
     found = homogeneous(t, noisy(x, 0), ("x", "y"))
     g = found.physics()["g"]
