@@ -101,9 +101,6 @@ def test_a_gap_in_which_the_target_was_kicked_stays_open(kick, bridges):
     x = np.stack([np.sin(phase), np.cos(phase)], axis=1)
     found = discover(t, add_noise(x, 0.02, np.random.default_rng(0)), degree=1)
     assert len(found.curves) == (1 if bridges else 2)
-    inside = np.linspace(14.6, 16.4, 20)
-    wave = np.stack([np.sin(inside), np.cos(inside)], axis=1)
-    assert not bridges or np.abs(found.curve(inside) - wave).max() < 0.02
 
 
 @pytest.mark.parametrize(
