@@ -78,6 +78,8 @@ def test_marks_of_byte_order(tmp_path):
         assert vl.Rig.load(tmp_path / "rig.toml") == rig
         (tmp_path / "a.csv").write_bytes("u,v\n1,2\n3,4\n".encode(encoding))
         np.testing.assert_array_equal(read_tracks(tmp_path / "a.csv")[0].pixels, [[1, 2], [3, 4]])
+    (tmp_path / "a.csv").write_bytes("Bildé,u,v\n0,1,2\n1,3,4\n".encode("latin-1"))
+    np.testing.assert_array_equal(read_tracks(tmp_path / "a.csv")[0].pixels, [[1, 2], [3, 4]])
 
 
 @pytest.fixture(scope="module")

@@ -8,44 +8,14 @@ from vidsindy_lite.vision.background import (
     BackgroundModel,
     Blob,
     Plate,
-    _unrest,
-    displacement,
     least_difference,
     lights_of,
     noise_of,
     tolerance,
-    track_blobs,
     view_distances,
-    whole_blobs,
 )
-from vidsindy_lite.vision.rendering import Scene, render
 
 SIZE = (128, 96)
-
-
-@pytest.fixture(scope="module")
-def texture():
-    """A smooth random image, coarse pixels."""
-    rng = np.random.default_rng(0)
-    return cv2.GaussianBlur(rng.uniform(0, 255, (60, 80, 3)).astype(np.float32), (0, 0), 3) * 4
-
-
-def test_one_push_or_one_change_of_light_is_unrest(texture):
-    ground = 100 + texture / 20
-    slope = np.gradient(ground, axis=(1, 0))
-    rng = np.random.default_rng(2)
-    changes = [rng.normal(0, 0.1, ground.shape).astype(np.float32) for _ in range(21)]
-
-    def unrest(changes):
-        return _unrest(ground, changes, displacement(ground, changes, 8.0), 8.0)
-
-    assert unrest(changes) == ()
-    pushed = [*changes[:20], changes[20] - (0.2 * slope[0]).astype(np.float32)]
-    assert ["camera moves" in doubt for doubt in unrest(pushed)] == [True]
-    dimmed = [*changes[:20], changes[20] - 0.05 * ground]
-    assert any("light changes, by up to 5 %" in doubt for doubt in unrest(dimmed))
-    lit = [*changes[:20], changes[20] + 0.9 * ground]
-    assert any("light changes, by up to 90 %" in doubt for doubt in unrest(lit))
 
 
 def blob(shape=(0, 0, 0, 0), area=400.0, inside=True, sound=True):
@@ -70,31 +40,6 @@ def learned(samples):
     model = BackgroundModel(samples)
     model.learn_target(samples)
     return model
-
-
-@pytest.mark.parametrize("variance", [0.0, 0.005])
-def test_the_model_of_a_film(variance):
-    truth = np.column_stack([np.linspace(20, 108, 45), 48 + 20 * np.sin(np.arange(45) / 5)])
-    scene = Scene("bricks", size=16, noise_variance=variance, image_size=SIZE)
-    frames = np.array(list(render(truth, scene, 1)))
-    model = learned(frames[::2])
-    clean = next(render([[np.nan, np.nan]], Scene("bricks", image_size=SIZE), 1)).astype(float)
-    off = np.abs(model.background - clean)
-    assert off.max() <= (0 if variance == 0 else 40)
-    assert off.mean() <= (0 if variance == 0 else 6)
-    assert model.noise == pytest.approx(255 * np.sqrt(variance), rel=0.15)
-    assert model.area == pytest.approx(np.pi * 8**2, rel=0.2)
-    assert model.unrest == ()
-    blobs = list(track_blobs(model, frames))
-    error = np.array([b.centroid for b in blobs]) - truth
-    assert np.sqrt(np.mean(error**2)) < (0.01 if variance == 0 else 0.1)
-    assert [b.area for b in blobs] == pytest.approx([np.pi * 8**2] * 45, rel=0.01 + 20 * variance)
-    assert np.isfinite(whole_blobs(model, frames)[0]).mean() > 0.95
-    near = model.search(frames[20])
-    assert np.abs(near[0] - truth[20]).max() < 4
-    assert 8 < near[1] < 24
-    assert model.search(clean.astype(np.uint8)) is None or variance
-    assert model.measure(frames[20], truth[20] + 30, 10) is None  # nothing there
 
 
 GROUND, TARGET = (90, 100, 110), (20, 40, 220)

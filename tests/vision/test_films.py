@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import Hint, track, write_video
-from vidsindy_lite.vision import Track, track_targets
+from vidsindy_lite.vision import Track
 from vidsindy_lite.vision.moving import unsure
 from vidsindy_lite.vision.refining import roughness
 from vidsindy_lite.vision.rendering import BACKGROUNDS
@@ -139,17 +139,6 @@ def test_one_push_of_the_camera_is_taken_out(tmp_path, when, hinted):
     assert np.nanmax(error) < 0.5
 
 
-def test_something_else_that_moves_is_not_followed_unsaid(tmp_path):
-    def passed(image, i):
-        disc(image, (20 + 2.6 * i, 120), 12, (60, 60, 60))
-        return image
-
-    found = track(film(tmp_path / "clip.mov", passed))
-    error = error_of(found, places())
-    right = np.isfinite(error).mean() > 0.8 and np.nanquantile(error, 0.9) < 0.5
-    assert right or any("something else moves" in doubt for doubt in found.warnings)
-
-
 def test_a_target_that_is_lost_in_many_frames_is_told(tmp_path):
     truth = places()
     truth[8:22] = truth[28:48] = -50
@@ -265,28 +254,6 @@ def test_a_target_that_is_half_in_the_shade_is_the_whole_of_it(tmp_path):
 
     _, error = followed(tmp_path, 6, (320, 180), sway, draw)
     assert np.nanpercentile(error, 95) < 1.5
-
-
-@pytest.mark.parametrize("apart", [13, 40])
-def test_two_equal_balls_side_by_side_are_never_one(tmp_path, apart):
-    middle = np.column_stack([160 + 90 * np.sin(ANGLE), 90 + 20 * np.sin(2 * ANGLE)])
-    off = apart / 2 + 12 * np.maximum(np.abs(np.arange(N) - N / 2) / 10 - 1.5, 0)
-    truth = [middle + off[:, None] * side for side in np.array([[0.6, 0.8], [-0.6, -0.8]])]
-    rng = np.random.default_rng(7)
-    back = texture(rng, 320, 180)
-
-    def frames():
-        for places_ in zip(*truth, strict=True):
-            image = back.copy()
-            for place in places_:
-                disc(image, place, 8, (30, 30, 220))
-            yield np.clip(image + rng.normal(0, 2, image.shape), 0, 255).astype(np.uint8)
-
-    tracks = track_targets(write_video(tmp_path / "two.mov", frames()), 2)
-    for found in tracks:
-        error = np.min([np.linalg.norm(found.pixels - one, axis=1) for one in truth], axis=0)
-        assert np.isfinite(error).mean() > (0.9 if apart > 20 else 0.4)
-        assert np.nanmax(error) < 1.5
 
 
 def test_a_view_of_another_size_or_off_the_way_is_known_less_well():

@@ -34,13 +34,18 @@ def distance_to_rectangle(points, rectangle):
     return np.linalg.norm(points - np.clip(points, low, low + [width, height]), axis=1)
 
 
-@pytest.mark.parametrize("background", ["plain", "hills", "wood"])
-def test_clean_textured_video(tmp_path, background):
-    truth = winding_path(100)
-    scene = Scene(background, size=18, image_size=SIZE)
-    error = errors(render_video(tmp_path / "clip.mov", truth, scene, seed=1), truth)
+@pytest.mark.parametrize("background", ["plain", "wood", "sky", "bricks"])
+def test_an_ordinary_video_raises_no_doubt(tmp_path, background):
+    clean, truth = background in ("plain", "wood"), winding_path(60)
+    scene = Scene(background, size=18, noise_variance=0 if clean else 0.01, image_size=SIZE)
+    path = render_video(tmp_path / "clip.mov", truth, scene, seed=1)
+    found = track(path)
+    error = np.linalg.norm(found.pixels - truth, axis=1)
     assert np.isfinite(error).all()
-    assert np.sqrt(np.mean(error**2)) < 0.02
+    assert np.sqrt(np.mean(error**2)) < (0.02 if clean else 0.2)
+    assert found.detector == "background"
+    assert found.warnings == ()
+    np.testing.assert_array_equal(found.pixels, track(path, "background").pixels)
 
 
 @pytest.mark.parametrize(
@@ -163,16 +168,6 @@ def test_auto_takes_out_the_motion_of_the_camera_and_of_the_light(
     assert any("the background is not at rest" in w for w in classical.warnings)
     error = np.linalg.norm(found.in_frames - truth, axis=1)
     assert np.mean(np.linalg.norm(classical.pixels - truth, axis=1) < 1) <= np.mean(error < 1)
-
-
-@pytest.mark.parametrize("background", ["sky", "sea", "bricks"])
-def test_an_ordinary_video_raises_no_doubt(tmp_path, background):
-    scene = Scene(background, size=30, noise_variance=0.01, image_size=SIZE)
-    path = render_video(tmp_path / "clip.mov", winding_path(40), scene)
-    found = track(path)
-    assert found.detector == "background"
-    assert found.warnings == ()
-    np.testing.assert_array_equal(found.pixels, track(path, "background").pixels)
 
 
 def test_a_camera_that_trembles_is_told(tmp_path):
