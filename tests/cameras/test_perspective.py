@@ -53,29 +53,10 @@ def small():
     return scene(7, n=60)
 
 
-def test_by_hand():
-    # Straight above, 10 units high, focal length 500: x to the right, y up.
-    camera = PerspectiveCamera(position=(1, 2, 10), normal=(0, 0, 1), scale=1 / 500, angle=0)
-    np.testing.assert_allclose(camera.project([[1, 2, 0]]), [[255.5, 255.5]])
-    np.testing.assert_allclose(camera.project([[2, 2, 0]]), [[305.5, 255.5]])
-    np.testing.assert_allclose(camera.project([[1, 3, 5]]), [[255.5, 155.5]])
-    assert camera.focal_length == 500
-
-
 def test_behind_the_camera_nothing_is_seen():
     camera = PerspectiveCamera(position=(0, 0, 10), normal=(0, 0, 1), scale=1, angle=0)
     seen = camera.project([[0, 0, 9], [0, 0, 10], [0, 0, 11], [np.nan, 0, 0]])
     assert np.isnan(seen).all(axis=1).tolist() == [False, True, True, True]
-
-
-def test_uncalibrated():
-    camera = PerspectiveCamera(position=(0, 0, 1), normal=(0, 0, 1))
-    assert not camera.is_calibrated
-    for use in (camera.project, camera.plane_coordinates):
-        with pytest.raises(ValueError, match="scale and angle must be known, got None"):
-            use(np.zeros((1, 3 if use == camera.project else 2)))
-    with pytest.raises(ValueError, match="scale and angle must be known"):
-        _ = camera.focal_length
 
 
 @given(SEEDS, st.floats(0.01, 0.3))
@@ -104,16 +85,17 @@ def test_bad_radius():
             camera.ball_image([[0, 0, 0]], radius)
 
 
-@given(SEEDS, st.integers(3, 6), st.data())
-@settings(max_examples=10)
-def test_exact_pixels_give_exact_cameras(seed, cameras, data):
+@given(SEEDS, st.data())
+@settings(max_examples=15)
+def test_exact_pixels_give_exact_cameras_though_views_are_missing(seed, data):
     mixed = (OrthographicCamera, PerspectiveCamera)
-    kinds = data.draw(st.sampled_from([mixed[1:], mixed]))
+    kinds = data.draw(st.sampled_from([mixed[:1], mixed[1:], mixed]))
+    cameras = data.draw(st.integers(3 if PerspectiveCamera in kinds else 2, 6))
     x, truth, tracks, rng = scene(seed, 100, cameras, kinds)
     seen = rng.random((100, cameras)) < 0.8
     for i, track in enumerate(tracks):
         track[~seen[:, i]] = np.nan
-    learned = learn_cameras(tracks, truth.uncalibrated(data.draw(st.integers(0, 2))))
+    learned = learn_cameras(tracks, truth.uncalibrated(data.draw(st.integers(0, cameras - 1))))
     assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
     found, enough = reconstruct(tracks, learned), seen.sum(axis=1) >= 2
     np.testing.assert_allclose(found[enough], x[enough], atol=1e-8 * np.ptp(x))
