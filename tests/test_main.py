@@ -69,7 +69,6 @@ def test_a_bad_file_gives_one_error_and_no_report(here, capsys, content, message
     ("options", "message"),
     [
         (["--rig", "none.toml"], "rig: no such file, got 'none.toml'"),
-        (["--rig", "a.avi"], "rig: must be a TOML file in UTF-8, got 'a.avi', which is none"),
         (["--rig", "rig.toml", "--lag", "0,7"], "lag: must be 3 finite numbers"),
         (
             ["--rig", "rig.toml", "--lag=0,0,-210"],
@@ -77,7 +76,6 @@ def test_a_bad_file_gives_one_error_and_no_report(here, capsys, content, message
         ),
         (["--rig", "rig.toml", "--fps", "0"], "fps: must be positive, got 0"),
         (["--rig", "rig.toml", "--lag", "0,soon,0"], "lag: must be numbers with commas between"),
-        (["--rig", "rig.toml", "--library", "tan(1)"], "library: must be a sum of polynomial("),
         (["--rig", "rig.toml", "--seed", "x"], "seed: must be an integer, got 'x'"),
         (["--rig", "rig.toml", "--loud"], "unrecognized arguments: --loud"),
         (
@@ -92,20 +90,6 @@ def test_bad_options_are_told_before_anything_is_tracked(here, capsys, options, 
     assert shown.startswith("error: ")
     assert message in shown
     assert shown.count("\n") == 1
-
-
-def test_one_rate_is_not_given_for_files_that_state_others(here, capsys):
-    frames = list(vl.read_video(here / "c.avi"))
-    vl.write_video(here / "other.avi", frames, fps=31, codec="MJPG")
-    videos = ["a.avi", "b.avi", "other.avi"]
-    assert main(["discover", *videos, "--rig", "rig.toml", "--fps", "30"]) == 2
-    message = (
-        "error: t: may be given, as --fps may, only for videos of one frame rate, got files that "
-        "state 30, 30, 31: leave it out, so that the rate of each file counts, or convert"
-    )
-    shown = capsys.readouterr().err
-    assert message in shown
-    assert "track:" not in shown
 
 
 @pytest.mark.parametrize(
@@ -204,30 +188,22 @@ def test_bad_tracks_are_told(tracked, capsys, options, message):
     assert not (tracked / "report").exists()
 
 
-@pytest.fixture
-def full_disk(monkeypatch):
+@pytest.mark.parametrize("degree", ["2", "7"])
+def test_a_full_disk_is_one_line_and_law_or_refusal_are_told(tracked, capsys, monkeypatch, degree):
     def full(path, *_):
         raise OSError(28, "No space left on device", str(path))
 
     monkeypatch.setattr(Path, "write_bytes", full)
-
-
-def test_a_full_disk_is_one_line_and_the_law_is_told(tracked, capsys, full_disk):
-    command = ["discover", "--rig", "rig.toml", "--fps", "25", "--degree", "2", "--tracks"]
+    command = ["discover", "--rig", "rig.toml", "--fps", "25", "--degree", degree, "--tracks"]
     assert main([*command, "a.csv", "b.csv", "c.csv"]) == 2
     shown = capsys.readouterr()
-    assert shown.out.startswith("dx/dt = ")
     (line,) = [one for one in shown.err.splitlines() if one.startswith("error:")]
     assert "No space left on device" in line
+    assert shown.out.startswith("dx/dt = ") == (degree == "2")
+    if degree == "7":
+        assert "x: must hold at least as many samples as unknowns" in line
+        assert "the tracks could not be drawn: [Errno 28] No space left on device" in line
     assert not list(tracked.glob("*report*"))
-
-
-def test_a_refusal_without_a_picture_is_told_all_the_same(tracked, capsys, full_disk):
-    command = ["discover", "--rig", "rig.toml", "--fps", "25", "--degree", "7", "--tracks"]
-    assert main([*command, "a.csv", "b.csv", "c.csv"]) == 2
-    (line,) = [one for one in capsys.readouterr().err.splitlines() if one.startswith("error:")]
-    assert "x: must hold at least as many samples as unknowns" in line
-    assert "the tracks could not be drawn: [Errno 28] No space left on device" in line
 
 
 @pytest.mark.slow
@@ -279,9 +255,3 @@ def test_the_version(capsys):
     assert capsys.readouterr().out == f"vidsindy_lite {vl.__version__}\n"
     project = tomllib.loads((Path(vl.__file__).parent.parent / "pyproject.toml").read_text())
     assert project["project"]["version"] == vl.__version__
-
-
-@pytest.mark.slow
-def test_demo_goes_from_videos_to_the_law(capsys):
-    assert main(["demo", "--system", "SprottE", "--frames", "200"]) == 0
-    assert "against the truth: all true terms found, 0 false" in capsys.readouterr().out

@@ -15,7 +15,6 @@ import pytest
 import vidsindy_lite as vl
 from vidsindy_lite import storage
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.cameras import read_calibration
 from vidsindy_lite.storage import (
     DEEPEST,
     PACKAGE,
@@ -48,27 +47,6 @@ def test_nested_files_are_refused(tmp_path, name):
     with pytest.raises(ValueError, match=f"at must be nested|must be nested {DEEPEST} levels"):
         read_tree("paths", path, path.suffix)
     assert main(["rig-import", str(path), "--size", "9x9"]) == 2
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "message"),
-    [
-        ("a.toml", b"a = " + b"9" * 400, "must hold numbers of less than 300 digits, got 999"),
-        ("a.toml", b"a = \x80", "must be a TOML file in UTF-8, got 'a.toml', which is none"),
-        ("a.json", b'{"P": 5}', "must hold 11 DLT coefficients"),
-        ("a.json", b'{"K": "x", "R": 1, "t": 2}', "K: must be an array of real numbers"),
-        ("a.npy", b"\x93NUMPY\x01\0v\0{'descr'", "must be a .npy file of numbers"),
-        ("a.npz", b"PK\x05\x06", "must be a .npz file of numbers"),
-        ("a.xml", b"<?xml", "must be a XML file"),
-        ("a.yaml", b"", "must be a YAML file"),
-    ],
-)
-def test_malformed_files_are_one_line(tmp_path, name, content, message):
-    (tmp_path / name).write_bytes(content)
-    with pytest.raises(ValueError, match=message) as caught:
-        read_calibration([tmp_path / name], (9, 9))
-    assert "\n" not in str(caught.value)
-    assert name in str(caught.value)
 
 
 def test_marks_of_byte_order(tmp_path):
@@ -155,16 +133,6 @@ def test_repository_is_found_from_inside(tiny, tmp_path):
     assert repository_root(tiny.notebooks) == tiny.root
     with pytest.raises(FileNotFoundError, match="repository: expected to be inside a clone"):
         repository_root(tmp_path.parent)
-
-
-def test_a_file_is_replaced_in_one_step(tmp_path):
-    write_file(tmp_path / "folder" / "a", b"one")
-    write_file(tmp_path / "folder" / "a", b"two")
-    (tmp_path / "folder" / "b").mkdir()
-    with pytest.raises(OSError, match="b"):
-        write_file(tmp_path / "folder" / "b", b"three")
-    assert (tmp_path / "folder" / "a").read_bytes() == b"two"
-    assert sorted(path.name for path in (tmp_path / "folder").iterdir()) == ["a", "b"]
 
 
 PARTS = {

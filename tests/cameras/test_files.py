@@ -197,10 +197,16 @@ def test_malformed_tables_are_refused_by_name(tmp_path, old, new, message):
         ("a.yml", "no yaml: [", "a.yml"),
         ("a.npz", "PK\x03\x04 no archive", "must be a .npz file of numbers"),
         ("a.mat", "x", "must end in .toml, .* or .txt, got '.*a.mat'"),
+        ("a.toml", "a = " + "9" * 400, "must hold numbers of less than 300 digits, got 999"),
+        ("a.toml", "a = \udc80", "must be a TOML file in UTF-8, got 'a.toml', which is none"),
+        ("a.json", '{"P": 5}', "must hold 11 DLT coefficients"),
+        ("a.json", '{"K": "x", "R": 1, "t": 2}', "K: must be an array of real numbers"),
+        ("a.npy", "\udc93NUMPY\x01\0v\0{'descr'", "must be a .npy file of numbers"),
+        ("a.xml", "<?xml", "must be a XML file"),
     ],
 )
 def test_files_that_are_no_calibration(tmp_path, name, content, message):
-    (tmp_path / name).write_text(content, encoding="utf-8")
+    (tmp_path / name).write_text(content, encoding="utf-8", errors="surrogateescape")
     with pytest.raises(ValueError, match=message) as caught:
         read_calibration([tmp_path / name], SIZE)
     assert name in str(caught.value)

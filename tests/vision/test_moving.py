@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from footage import Phone, camera_maps, write_phone
+from footage import Phone, write_phone
 from helpers import real
 
 from vidsindy_lite import Hint, track, write_video
-from vidsindy_lite.vision.camera import CameraMotion, at_rest, carry, stands_still, steadied
+from vidsindy_lite.vision.camera import CameraMotion, at_rest
 from vidsindy_lite.vision.candidates import Candidates
 from vidsindy_lite.vision.moving import expected, finished
 from vidsindy_lite.vision.refining import View
@@ -70,23 +70,6 @@ def test_where_two_things_move_alike_it_says_so_and_a_hint_decides(tmp_path):
         assert np.isfinite(error).mean() > 0.9
         assert np.nanmax(error) < 1
         assert not any("something else moves" in warning for warning in found.warnings)
-
-
-def test_the_camera_is_followed():
-    phone = Phone(camera="held", **SMALL)
-    rng = np.random.default_rng(3)
-    maps = camera_maps(phone, rng)[4::8]
-    scene = cv2.GaussianBlur(rng.uniform(0, 255, (340, 420, 3)).astype(np.float32), (0, 0), 2)
-    scene = np.clip(128 + 6 * (scene - 128), 0, 255)
-    move = np.array([[1, 0, -50], [0, 1, -50], [0, 0, 1.0]])
-    views = [cv2.warpPerspective(scene, m @ move, (320, 240)).astype(np.uint8) for m in maps]
-    motion = steadied(views, 1)
-    points = np.array([[40, 40], [280, 40], [40, 200], [280, 200.0]])
-    for here, true in zip(motion.maps, maps, strict=True):
-        assert np.abs(carry(here, carry(true, points)) - points).max() < 0.5
-    assert motion.moves
-    assert not stands_still(views[::6])
-    assert stands_still([views[0]] * 5)
 
 
 def followed_to(n=30, factor=1, maps=None):
