@@ -41,7 +41,7 @@ def test_all_frames_together_tell_how_a_camera_trembles_before_a_sky(tmp_path):
     assert motion.errors[0] == 0
 
 
-@pytest.mark.parametrize("change", [{"size": 90}, {"person": True, "leaves": True}])
+@pytest.mark.parametrize("change", [{"size": 90}, {"leaves": True}])
 def test_nothing_else_is_taken_for_a_motion_of_the_camera(tmp_path, monkeypatch, change):
     path, *_ = film(tmp_path, 1, **change)
     assert by_the_plate(path) is None
