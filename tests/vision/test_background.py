@@ -194,15 +194,3 @@ def test_the_tolerance_is_five_times_the_noise_and_what_a_displaced_edge_does(
     np.testing.assert_allclose(found[near & known], least + 50 * edge, rtol=1e-6)
     np.testing.assert_allclose(found[~near & known], least, rtol=1e-6)
     assert (~known).any() == (pan > 0)
-
-
-def test_the_noise_of_a_film_is_that_of_its_samples():
-    light = 0.8
-    rng = np.random.default_rng(0)
-    ground = rng.uniform(80, 200, (90, 120, 3))
-    samples = light ** (np.arange(21) % 2)[:, None, None, None] * ground
-    samples = (samples + rng.normal(0, 6, samples.shape)).round().astype(np.uint8)
-    maps = np.array([np.eye(3)] * 21)
-    plate = Plate(samples, maps, np.ones(21, bool))
-    plate.image = ground.round().astype(np.uint8)
-    assert noise_of(samples, maps, plate) == pytest.approx(6, rel=0.1)
