@@ -18,9 +18,7 @@ def test_the_times_of_each_track_are_checked():
     assert Clock.of_tracks(np.arange(4) / 30, tracks).uneven is None
     with pytest.raises(ValueError, match=r"t: must have shape \(5,\), one per row of tracks\[1\]"):
         Clock.of_tracks([range(4), range(4)], tracks)
-
-
-def test_one_clock_for_all_tracks():
+    # One clock for all of them.
     clock = Clock.of_tracks([3.0, 3.5, 4.0], [np.zeros((3, 2)), np.zeros((5, 2))])
     assert clock.times.tolist() == [3.0, 3.5, 4.0]
     assert clock.rates.tolist() == [1, 1]

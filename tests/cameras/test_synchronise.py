@@ -20,6 +20,13 @@ from vidsindy_lite.cameras.synchronise import agrees
 NOISE = 0.05  # pixels
 
 
+@pytest.fixture(scope="module")
+def motion():
+    """A motion as a function of the frame number, from -60 to 340, and a rig around it."""
+    x = trajectory(np.random.default_rng(4), 400)
+    return CubicSpline(np.arange(400) - 60, x), vl.Rig.around(x)
+
+
 def test_whole_lags_move_tracks_as_they_are(motion):
     tracks = filmed(motion, (100, 90, 120), (0, 0, 0))
     first, second, third = align(tracks, (0, 7, -12))

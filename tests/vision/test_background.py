@@ -111,16 +111,15 @@ def test_a_part_of_a_target_that_is_in_the_background_shows(reach, shows):
     assert model.shows_target() == shows
 
 
-def panned(u, v, size=(48, 36)):
-    """A plate of 21 frames (width, height) of a camera that pans by (u, v) pixels in each."""
-    maps = np.array([[[1, 0, u * k], [0, 1, v * k], [0, 0, 1.0]] for k in range(21)])
-    samples = np.full((21, *size[::-1], 3), 100, np.uint8)
-    return Plate(samples, maps, np.ones(21, bool))
+def panning(frames, u, v=0):
+    """Maps of a camera that pans by (u, v) pixels in each frame."""
+    return np.array([[[1, 0, u * k], [0, 1, v * k], [0, 0, 1.0]] for k in range(frames)])
 
 
 @pytest.mark.parametrize("pan", [(20, 0), (0, -15)])
 def test_a_plate_of_a_camera_that_turns_far_shows_what_is_around_the_middle_of_its_way(pan):
-    plate = panned(*pan)
+    samples = np.full((21, 36, 48, 3), 100, np.uint8)
+    plate = Plate(samples, panning(21, *pan), np.ones(21, bool))
     along = int(np.argmax(np.abs(pan)))
     size, frame = plate.image.shape[1::-1], (48, 36)
     assert 2.2 * frame[along] < size[along] < 2.6 * frame[along]
@@ -135,7 +134,7 @@ def test_ground_that_a_target_hides_is_what_is_seen_of_it_or_what_is_around_it(p
     """A dark disc that turns about its place, whose middle hides its ground in all frames."""
     ground = np.full((80, 140, 3), 150, np.uint8)
     ground[:, 70:] = 160
-    maps = np.array([[[1, 0, pan * k], [0, 1, 0], [0, 0, 1.0]] for k in range(9)])
+    maps = panning(9, pan)
     at = np.array([[70 + 5 * np.cos(k), 40 + 5 * np.sin(k)] for k in range(9)])
     samples = []
     for k, place in enumerate(at):
@@ -161,7 +160,7 @@ def test_a_plate_is_of_one_light_though_the_exposure_changes(pan):
     exposure = np.linspace(0.7, 1.4, 15)
     samples = np.array([(a * ground[:, pan * k :][:, :140]).round().astype(np.uint8)
                         for k, a in enumerate(exposure)])  # fmt: skip
-    maps = np.array([[[1, 0, pan * k], [0, 1, 0], [0, 0, 1.0]] for k in range(15)])
+    maps = panning(15, pan)
     known = np.ones(15, bool)
     lights = lights_of(samples, maps, known)
     ratio = lights / exposure[:, None]
@@ -184,8 +183,7 @@ def test_the_tolerance_is_five_times_the_noise_and_what_a_displaced_edge_does(
     scene = np.full((30, 50, 3), 100, np.uint8)
     scene[:, 25:] = 150
     samples = np.array([scene[:, pan * k : pan * k + 40] for k in range(5)])
-    maps = np.array([[[1, 0, pan * k], [0, 1, 0], [0, 0, 1.0]] for k in range(5)])
-    plate = Plate(samples, maps, np.ones(5, bool))
+    plate = Plate(samples, panning(5, pan), np.ones(5, bool))
     found = tolerance(plate.image, least_difference(noise), moves=plate.moves)[15]
     step = int(np.argmax(plate.image[15, :, 0] > 125))
     known = plate.valid[15] > 0

@@ -221,6 +221,36 @@ def test_what_goes_on_beyond_the_window_is_not_the_whole_target(tmp_path):
     assert np.nanpercentile(error, 95) < 1.5
 
 
+def test_where_two_things_move_alike_it_says_so_and_a_hint_decides(tmp_path):
+    t = np.arange(60)
+    both = [np.column_stack([40 + 4 * t, 60 + 30 * np.sin(t / (6 + k)) + 80 * k]) for k in (0, 1)]
+
+    def draw(image, i):
+        return disc(disc(image, both[0][i], 8, (30, 30, 210)), both[1][i], 8, (30, 30, 210))
+
+    path = painted(tmp_path, texture(np.random.default_rng(0), 320, 240), draw, 60)
+    assert any("something else moves" in warning for warning in track(path).warnings)
+    for truth in both:
+        found, error = followed(path, truth, around(truth, 19, 20), 0.9)
+        assert np.nanmax(error) < 1
+        assert not any("something else moves" in warning for warning in found.warnings)
+
+
+def test_a_small_target_is_followed_from_a_box_that_is_drawn_loosely(tmp_path):
+    turn = np.linspace(0, 4 * np.pi, 60)
+    truth = np.column_stack([240 + 170 * np.cos(turn), 120 + 80 * np.sin(turn)])
+
+    def draw(image, i):
+        return disc(image, truth[i], 3, (220, 30, 30)) * (1 + 0.05 * np.sin(0.7 * i))
+
+    path = painted(tmp_path, texture(np.random.default_rng(3), 480, 240), draw, 60)
+    found, error = followed(path, truth, around(truth, 16), 0.9)
+    assert np.nanmax(error) < 1.5
+    assert found.warnings == ()
+    still = track(path, target=Hint(frame=10, box=(230, 110, 20, 20)))
+    assert "looks alone" in " ".join(still.warnings)
+
+
 def test_a_target_that_is_half_in_the_shade_is_the_whole_of_it(tmp_path):
     sway = np.column_stack([80 + 40 * np.sin(ANGLE / 2), 90 + 40 * np.sin(ANGLE)])
     light = 1 - 0.5 / (1 + np.exp((np.arange(320) - 115) / 2))

@@ -2,13 +2,12 @@
 
 from types import SimpleNamespace
 
-import cv2
 import numpy as np
 import pytest
 from footage import Phone, write_phone
 from helpers import real
 
-from vidsindy_lite import Hint, track, write_video
+from vidsindy_lite import track
 from vidsindy_lite.vision.camera import CameraMotion, at_rest
 from vidsindy_lite.vision.candidates import Candidates
 from vidsindy_lite.vision.moving import expected, finished
@@ -44,32 +43,6 @@ def test_a_large_target_is_plainer_than_leaves_that_sway(tmp_path):
     found, error = errors(tmp_path / "clip.mp4", truth)
     assert np.nanpercentile(error, 95) < 1.5
     assert not found.warnings
-
-
-def test_where_two_things_move_alike_it_says_so_and_a_hint_decides(tmp_path):
-    n = 60
-    t = np.arange(n)
-    places = [np.column_stack([40 + 4 * t, 60 + 30 * np.sin(t / (6 + k)) + 80 * k]) for k in (0, 1)]
-    rng = np.random.default_rng(0)
-    ground = cv2.GaussianBlur(rng.uniform(0, 255, (240, 320, 3)).astype(np.float32), (0, 0), 4)
-
-    def frames():
-        for i in range(n):
-            frame = 60 + ground.copy() / 2
-            for place in places:
-                cv2.circle(frame, tuple(np.rint(16 * place[i]).astype(int)), 16 * 8,
-                           (30, 30, 210), -1, cv2.LINE_AA, 4)  # fmt: skip
-            yield np.clip(frame + rng.normal(0, 2, frame.shape), 0, 255).astype(np.uint8)
-
-    path = write_video(tmp_path / "clip.mov", frames())
-    plain = track(path)
-    assert any("something else moves" in warning for warning in plain.warnings)
-    for truth in places:
-        hint = Hint(frame=20, box=(*(truth[20] - 9), 19, 19))
-        found, error = errors(path, truth, hint)
-        assert np.isfinite(error).mean() > 0.9
-        assert np.nanmax(error) < 1
-        assert not any("something else moves" in warning for warning in found.warnings)
 
 
 def followed_to(n=30, factor=1, maps=None):
@@ -149,32 +122,3 @@ def test_the_toss():
     error = np.linalg.norm(track(path).in_frames - truth, axis=1)
     shown = np.isfinite(truth[:, 0])
     assert (error[shown] < 1).mean() >= 0.9
-
-
-def lit_unevenly(radius, frames=60, seed=3):
-    """A red ball of some pixels that circles before texture, in light that flickers."""
-    rng = np.random.default_rng(seed)
-    ground = sum(
-        s * cv2.GaussianBlur(rng.normal(size=(240, 480, 3)), (0, 0), s) for s in (2, 8, 32)
-    )
-    ground = 110 + 35 * ground / ground.std()
-    turn = np.linspace(0, 4 * np.pi, frames)
-    truth = np.column_stack([240 + 170 * np.cos(turn), 120 + 80 * np.sin(turn)])
-    for k, place in enumerate(truth):
-        image = ground.copy()
-        middle = [round(16 * v) for v in place]
-        cv2.circle(image, middle, 16 * radius, (220, 30, 30), -1, cv2.LINE_AA, 4)
-        image *= 1 + 0.05 * np.sin(0.7 * k)
-        yield place, np.clip(image + rng.normal(0, 2, image.shape), 0, 255).astype(np.uint8)
-
-
-def test_a_small_target_is_followed_from_a_box_that_is_drawn_loosely(tmp_path):
-    truth, images = map(np.array, zip(*lit_unevenly(3), strict=True))
-    path = write_video(tmp_path / "clip.mov", iter(images))
-    box = (*(truth[10] - 8), 16, 16)
-    found, error = errors(path, truth, Hint(frame=10, box=box))
-    assert np.nanmax(error) < 1.5
-    assert np.isfinite(error).mean() > 0.9
-    assert found.warnings == ()
-    still = track(path, target=Hint(frame=10, box=(230, 110, 20, 20)))
-    assert "looks alone" in " ".join(still.warnings)

@@ -9,7 +9,7 @@ from tiny_onnx import write_red_detector
 from vidsindy_lite import Hint
 from vidsindy_lite.vision import track_targets
 from vidsindy_lite.vision.rendering import Scene, render_restless, render_video
-from vidsindy_lite.vision.tracking import LEAST, Detection, check_detector, link, track
+from vidsindy_lite.vision.tracking import LEAST, Detection, link, track
 from vidsindy_lite.vision.video import write_video
 
 SIZE = (256, 192)
@@ -209,13 +209,6 @@ def test_any_onnx_model_tracks(tmp_path):
 def test_unknown_detectors(tmp_path, detector):
     with pytest.raises(ValueError, match="detector: must be one of auto, background, learned, or"):
         track(tmp_path / "clip.mov", detector)
-
-
-def test_a_missing_detector_is_told_at_once(tmp_path):
-    for name in ("none.onnx", tmp_path / "none.onnx", tmp_path / "NONE.ONNX"):
-        with pytest.raises(FileNotFoundError, match=rf"detector: no such file, got '{name}'"):
-            check_detector(name)
-    assert check_detector(write_red_detector(tmp_path / "red.onnx", (256, 256))) is None
 
 
 def seen(u, confidence=0.9):
