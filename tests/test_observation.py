@@ -26,13 +26,6 @@ def test_a_hopeless_lag_is_named(case, lag):
         vl.observe_tracks(tracks, rig, np.arange(150), lags=(0, 0, lag))
 
 
-def test_a_track_of_nothing_is_named(case):
-    rig, (first, second, third) = case
-    tracks = [first, np.full_like(second, np.nan), third]
-    with pytest.raises(ValueError, match=r"tracks\[1\]: must see the target in some frame"):
-        vl.observe_tracks(tracks, rig, np.arange(150))
-
-
 def test_a_view_along_the_motion_helps_though_its_lag_is_not_told():
     t = np.arange(120) / 30
     x = np.outer(3 + 2 * np.cos(4 * t), (0, 0, 1))

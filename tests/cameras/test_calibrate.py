@@ -243,15 +243,8 @@ def test_tracks_that_do_not_fit_the_rig(small, use):
 
 def test_too_few_common_frames(small):
     _, rig, tracks, _ = small
-    start = rig.uncalibrated()
-    one = [track[:1] for track in tracks]
     with pytest.raises(ValueError, match=r"at least 2 equations .* of cameras\[1\] and .* got 1"):
-        learn_cameras(one, start)
-    tracks[0][20:] = np.nan
-    tracks[1][20:] = np.nan
-    tracks[2][:20] = np.nan
-    with pytest.raises(ValueError, match=r"scale and angle of cameras\[2\], got"):
-        learn_cameras(tracks, start)
+        learn_cameras([track[:1] for track in tracks], rig.uncalibrated())
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import pytest
 from helpers import trajectory
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import least_squares
 
 from vidsindy_lite.cameras import (
     OrthographicCamera,
@@ -19,6 +20,7 @@ from vidsindy_lite.cameras import (
 )
 
 SEEDS = st.integers(0, 2**32 - 1)
+MIXED = (OrthographicCamera, PerspectiveCamera)
 
 
 def scene(seed, n=200, cameras=3, kinds=(PerspectiveCamera,)):
@@ -46,6 +48,40 @@ def scene(seed, n=200, cameras=3, kinds=(PerspectiveCamera,)):
         )
     rig = Rig(views)
     return x, rig, [camera.project(x) for camera in rig.cameras], rng
+
+
+@pytest.mark.parametrize("cameras", [2, 3])
+@pytest.mark.parametrize("kinds", [MIXED[:1], MIXED[1:], MIXED])
+def test_noisy_pixels_give_the_least_squares_of_scipy(cameras, kinds):
+    x, rig, tracks, rng = scene(0, 6, cameras, kinds)
+    tracks = [track + 3 * rng.normal(size=track.shape) for track in tracks]
+    if cameras > 2:
+        tracks[2][1] = np.nan
+    found = reconstruct(tracks, rig)
+    for k in range(6):
+        shown = zip(rig.cameras, tracks, strict=True)
+        seen = [(c, t[k]) for c, t in shown if np.isfinite(t[k]).all()]
+
+        def missed(point, seen=seen):
+            return np.concatenate([c.project(point[None])[0] - pixel for c, pixel in seen])
+
+        best = least_squares(missed, x[k], xtol=1e-14, ftol=1e-14, gtol=1e-14, x_scale="jac")
+        np.testing.assert_allclose(found[k], best.x, atol=1e-6 * np.ptp(x))
+
+
+def test_lines_that_meet_behind_a_camera_give_no_point():
+    straight = {"scale": 0.001, "angle": 0.0, "image_size": (1001, 1001)}
+    rig = Rig(
+        [
+            PerspectiveCamera(position=(0, 0, 10), normal=(0, 0, 1), **straight),
+            PerspectiveCamera(position=(4, 0, 10), normal=(0, 0, 1), **straight),
+        ]
+    )
+    # By hand: (0, 0, 2) lies 8 below the first camera, and .5 of the depth to the other's side.
+    seen = [np.array([[500.0, 500.0]]), np.array([[0.0, 500.0]])]
+    np.testing.assert_allclose(reconstruct(seen, rig), [[0, 0, 2]], atol=1e-9)
+    assert np.isnan(reconstruct([seen[0], 1000 - seen[1]], rig)).all()
+    assert np.isnan(reconstruct([seen[0], seen[0]], rig)).all()  # parallel
 
 
 def test_behind_the_camera_nothing_is_seen():
@@ -83,8 +119,7 @@ def test_bad_radius():
 @given(SEEDS, st.data())
 @settings(max_examples=15)
 def test_exact_pixels_give_exact_cameras_though_views_are_missing(seed, data):
-    mixed = (OrthographicCamera, PerspectiveCamera)
-    kinds = data.draw(st.sampled_from([mixed[:1], mixed[1:], mixed]))
+    kinds = data.draw(st.sampled_from([MIXED[:1], MIXED[1:], MIXED]))
     cameras = data.draw(st.integers(3 if PerspectiveCamera in kinds else 2, 6))
     x, truth, tracks, rng = scene(seed, 100, cameras, kinds)
     seen = rng.random((100, cameras)) < 0.8
