@@ -203,6 +203,7 @@ def test_malformed_tables_are_refused_by_name(tmp_path, old, new, message):
         ("a.json", '{"K": "x", "R": 1, "t": 2}', "K: must be an array of real numbers"),
         ("a.npy", "\udc93NUMPY\x01\0v\0{'descr'", "must be a .npy file of numbers"),
         ("a.xml", "<?xml", "must be a XML file"),
+        ("a.yaml", "", "must be a YAML file"),
     ],
 )
 def test_files_that_are_no_calibration(tmp_path, name, content, message):

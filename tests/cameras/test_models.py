@@ -192,6 +192,7 @@ def test_planes_and_distances_by_hand():
             plane_through((0, 0, 0), (size, size, 0), (3 * size, 3 * size, 1e-13 * size))
 
 
+UNKNOWN = PerspectiveCamera(position=(0, 0, 1), normal=(0, 0, 1))
 AT_REST = OrthographicCamera(position=(0, 0, 0), normal=(0, 0, 1), scale=1, angle=0)
 
 
@@ -201,6 +202,9 @@ AT_REST = OrthographicCamera(position=(0, 0, 0), normal=(0, 0, 1), scale=1, angl
         (lambda: AT_REST.project(np.zeros((4, 2))), r"x: must have shape \(n, 3\), got \(4, 2\)"),
         (lambda: AT_REST.project([[0, np.inf, 0]]), "x: must be finite or NaN, got 1 infinite"),
         (lambda: AT_REST.plane_coordinates([1, 2]), r"pixels: must have shape \(n, 2\), got \(2,"),
+        (lambda: UNKNOWN.project(np.eye(3)), "scale and angle must be known, got None"),
+        (lambda: UNKNOWN.plane_coordinates(np.eye(2)), "scale and angle must be known, got None"),
+        (lambda: UNKNOWN.focal_length, "scale and angle must be known"),
         (lambda: rotation_to_z([0, 0, 0]), "normal: must not be the zero vector, got"),
         (lambda: rodrigues([0, 0, 0], 1.0), "axis: must not be the zero vector, got"),
         (lambda: plane_projection([1, 2], [0, 0, 1], 0), r"x: must have shape \(\.\.\., 3\), got"),
