@@ -1,8 +1,8 @@
 """Films as phones write them, with the exact track of the target: for the tests of the tracker.
 
 A ball moves through a room (perspective, so that its size changes), blurred by its own motion and
-that of the camera, before light that flickers, beside its shadow, a person or leaves,
-with sensor noise, and is written by H.264 at a low bit rate.
+that of the camera, before light that flickers, beside its shadow or leaves, with
+sensor noise, and is written by H.264 at a low bit rate.
 """
 
 from dataclasses import dataclass
@@ -14,27 +14,24 @@ import numpy as np
 
 from vidsindy_lite.vision.rendering import BACKGROUNDS, coverage, leaves
 
+NEARNESS = 1.3  # by what factor the size of a target changes
+
 
 @dataclass(frozen=True)
 class Phone:
     """What is filmed and how.
 
-    `size` is the diameter in pixels at the middle distance, `nearness` by what factor it changes;
-    `colour` in red, green and blue; `exposure` in frames; `bitrate` in bits a second.
+    `size` is the diameter in pixels at the middle distance; `colour` in red, green and blue.
     """
 
     background: str = "hills"
     size: float = 24.0
-    nearness: float = 1.3
     colour: tuple[int, int, int] = (215, 30, 35)
-    exposure: float = 0.5
     flicker: float = 0.0
     noise: float = 2.0
     shadow: bool = False
-    person: bool = False
     leaves: bool = False
     camera: str = "fixed"
-    bitrate: int = 4_000_000
     image_size: tuple[int, int] = (640, 480)
     frames: int = 120
 
@@ -43,12 +40,12 @@ def path_of(phone: Phone, rng: np.random.Generator) -> tuple[np.ndarray, np.ndar
     """Centre of the target over the scene, sub-frame by sub-frame, and its relative size."""
     width, height = phone.image_size
     t = np.arange(phone.frames * 8) / 8 / 120
-    largest = phone.size * phone.nearness / 2 + 4
+    largest = phone.size * NEARNESS / 2 + 4
     reach = np.array([width, height]) / 2 - largest - 30
     pace, phase = rng.uniform(1.2, 2.2, 2), rng.uniform(0, 2 * np.pi, 2)
     centre = np.array([width, height]) / 2 - 0.5
     places = centre + np.clip(reach, 15, None) * np.sin(2 * np.pi * np.outer(t, pace) + phase)
-    scale = phone.nearness ** np.sin(2 * np.pi * t * rng.uniform(0.5, 1) + rng.uniform(0, 6))
+    scale = NEARNESS ** np.sin(2 * np.pi * t * rng.uniform(0.5, 1) + rng.uniform(0, 6))
     return places, scale
 
 
@@ -91,22 +88,6 @@ def _disc(centre, size):
     return centre + size / 2 * area * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def _person(t, width, height, phase):
-    """Body, head and two legs of somebody who walks about."""
-    u = width * (0.5 + 0.38 * np.sin(2 * np.pi * t / 160 + phase))
-    foot, tall = 0.98 * height, 0.5 * height
-    swing = 0.12 * tall * np.sin(t / 3)
-    box = lambda l, t_, r, b: np.array([[l, t_], [r, t_], [r, b], [l, b]])  # noqa: E731
-    hip = foot - 0.45 * tall
-    parts = [(box(u - 0.1 * tall, foot - 0.85 * tall, u + 0.1 * tall, hip), (90, 60, 50))]
-    for side in (-1, 1):
-        toe = u + side * swing
-        leg = np.array([[u - 9, hip], [u + 9, hip], [toe + 8, foot], [toe - 8, foot]])
-        parts.append((leg, (60, 50, 45)))
-    parts.append((_disc(np.array([u, foot - 0.93 * tall]), 0.15 * tall), (120, 150, 190)))
-    return parts
-
-
 def render_phone(phone: Phone, seed: int = 0):
     """Frames and truth: (frames, 2) in the first frame's pixels, (frames, 2) in each one's own."""
     rng = np.random.default_rng(seed)
@@ -124,19 +105,14 @@ def render_phone(phone: Phone, seed: int = 0):
     green = leaves(rng, (64, 64)).reshape(-1, 3).mean(axis=0)
     shift = np.array([[1, 0, -margin], [0, 1, -margin], [0, 0, 1.0]])
     light = 1 + phone.flicker * np.sin(2 * np.pi * 0.37 * np.arange(phone.frames) + phase)
-    steps = max(1, round(8 * phone.exposure))
-    first = (8 - steps) // 2
     for i in range(phone.frames):
-        use = list(range(8 * i + first, 8 * i + first + steps))
+        use = list(range(8 * i + 2, 8 * i + 6))  # an exposure of half a frame
         base = scene.copy()
-        if phone.person:
-            for polygon, colour in _person(i, width, height, phase):
-                _paint(base, polygon + margin, colour)
         for place, beat, size in twigs:
             sway = 5 * np.array([np.sin(i / 4 + beat), 0.5 * np.cos(i / 3 + beat)])
             _paint(base, _disc(place + sway, size), green)
         here = places[use].mean(axis=0)
-        around = 3 * phone.size * phone.nearness + np.ptp(places[use], axis=0).max() + 20
+        around = 3 * phone.size * NEARNESS + np.ptp(places[use], axis=0).max() + 20
         low = np.clip(here + margin - around, 0, None).astype(int)
         window = base[
             low[1] : int(here[1] + margin + around), low[0] : int(here[0] + margin + around)
@@ -148,7 +124,7 @@ def render_phone(phone: Phone, seed: int = 0):
             if phone.shadow:
                 _paint(image, _disc(centre + [0.9 * size + 12, 0.8 * size + 10], size), None, 0.8)
             _paint(image, _disc(centre, size), phone.colour)
-            total += image / steps
+            total += image / 4
         window[:] = total
         middle = maps[8 * i + 4]
         base = cv2.warpPerspective(base, middle @ shift, (width, height))
@@ -166,7 +142,7 @@ def write_phone(path: Path, phone: Phone, seed: int = 0):
         stream = container.add_stream("libx264", Fraction(30))
         stream.width, stream.height = phone.image_size
         stream.pix_fmt = "yuv420p"
-        stream.bit_rate = phone.bitrate
+        stream.bit_rate = 4_000_000
         stream.codec_context.thread_count = 1
         stream.options = {"preset": "fast"}
         for frame, here, there in render_phone(phone, seed):

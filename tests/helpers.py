@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics.library import Library
-from vidsindy_lite.dynamics.model import Form
-from vidsindy_lite.dynamics.problem import pose
+from vidsindy_lite.dynamics.solver import _solved, _Task
 from vidsindy_lite.vision.candidates import Candidates
 
 REAL = Path(vl.__file__).parents[2] / "shared" / "real"
@@ -60,6 +60,22 @@ def trajectory(rng, n):
     return rng.normal(scale=5, size=3) + rng.uniform(1, 100) * waves
 
 
+def moving(acceleration, x0, v0, t):
+    """Positions of a motion, (n, m)."""
+    m = len(x0)
+
+    def rate(_, state):
+        return np.append(state[m:], acceleration(state[:m], state[m:]))
+
+    start = np.append(x0, v0).astype(float)
+    return solve_ivp(rate, (t[0], t[-1]), start, t_eval=t, rtol=1e-10, atol=1e-11).y[:m].T
+
+
+def noisy(x, share, seed=0):
+    """Values with errors of a share of the spread of each column."""
+    return x + share * x.std(axis=0) * np.random.default_rng(seed).normal(size=x.shape)
+
+
 def dependent(rng, n, memory):
     """A series of mean 0 and variance 1 in which each value keeps a share of the one before."""
     series = rng.normal(size=(n, 2))
@@ -96,14 +112,12 @@ def scene(seed, n=500, cameras=3):
     return x, rig, [camera.project(x) for camera in rig.cameras], rng
 
 
-def posed(noise=0.0, seen=slice(None)):
-    """A small wave about (3, 0), as a discovery's problem; noise in parts of its amplitudes."""
-    t = np.linspace(0, 20, 401)
-    x = np.stack([3 + 2 * np.sin(t), 0.1 * np.cos(t)], axis=1)
-    x += noise * np.array([2, 0.1]) * np.random.default_rng(0).normal(size=x.shape)
-    t, x = t[seen], x[seen]
-    form = Form.of(("x", "y"), Library.polynomial(2))
-    return pose([(t, x)], [np.ones((len(t), 2, 1))], form, rng=np.random.default_rng(0))
+def solved(t, x, degree):
+    """What is found of one motion by a law of first order, its problem and its fit."""
+    measured = [(t, x)], [np.zeros((*x.shape, 0))], None
+    names, library = tuple("xyz"[: x.shape[1]]), Library.polynomial(degree)
+    task = _Task(measured, names, library, "learn", 0, False, np.inf)
+    return _solved(task, task.form(1))
 
 
 def filmed(motion, frames, lags, rates=(1, 1, 1), noise=0.05):

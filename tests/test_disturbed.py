@@ -3,27 +3,15 @@
 Assertions of a notebook have to test what it says, not the numbers of its default: each has two
 other settings. One of a small one runs with all tests, the rest by `pytest -m thorough`.
 
-Disturbed are every track and trajectory, by `disturbed/sitecustomize.py`, in every process that has
-its folder on PYTHONPATH. The full profile is disturbed in the same way, in a copy of the repository
-whose figures are then compared:
+Each run of all tests disturbs tracks and trajectories of the quick notebooks, see `test_notebooks`.
+So is the full profile, in a copy of the repository whose figures are then compared:
 
     VIDSINDY_DISTURB=1e-9:1 PYTHONPATH=tests/disturbed make figures FORCE=1
     python -m vidsindy_lite compare figures ../copy/figures
-
-and so is a run with another kernel of OpenBLAS or other threads (OPENBLAS_CORETYPE=Haswell,
-OMP_NUM_THREADS=2), with VIDSINDY_CACHE set to a folder of its own.
-
-Each run of all tests disturbs the quick notebooks once, see `test_notebooks`; `pytest -m thorough`
-does it twice more.
 """
 
-import json
-from contextlib import redirect_stdout
-from io import StringIO
-
-import numpy as np
 import pytest
-from helpers import SIZE, python, run_quickly
+from helpers import run_quickly
 
 from vidsindy_lite.companion.run import find_notebooks
 from vidsindy_lite.storage import PACKAGE
@@ -68,46 +56,6 @@ def test_a_notebook_holds_for_other_settings(number, settings, tmp_path, shared_
 
 # -------------------------------------------------------------------------------------- last digits
 
-SHOW = """\
-import json, sys
-import numpy as np
-from vidsindy_lite import Rig, Scene, reconstruct, render_video, track
-from vidsindy_lite.dynamics import runge_kutta_4
-from vidsindy_lite.study import SYSTEMS
-t, x = SYSTEMS["Lorenz"].trajectory(40)
-path = np.linspace([0.0, 0.0, 0.0], [100.0, 40.0, 5.0], 40)
-rig = Rig.around(path)
-video = render_video(sys.argv[1], rig.cameras[0].project(path), Scene(background="plain"))
-print(json.dumps({
-    "simulate": x.tolist(),
-    "runge_kutta_4": runge_kutta_4(SYSTEMS["Lorenz"], t, (-8, 7, 27)).tolist(),
-    "reconstruct": reconstruct([camera.project(path) for camera in rig.cameras], rig).tolist(),
-    "track": track(video).pixels.tolist(),
-}))
-"""
-
-
-@pytest.fixture(scope="module")
-def shown(tmp_path_factory, shared_cache):
-    """What the functions return, undisturbed and by two seeds."""
-    video = tmp_path_factory.mktemp("shown") / "one.mov"
-    with redirect_stdout(StringIO()) as here, pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sys.argv", ["-c", str(video)])
-        exec(SHOW, {})
-    ran = [python("-c", SHOW, video, cache=shared_cache, seed=seed) for seed in (1, 2)]
-    assert all(r.returncode == 0 for r in ran), [r.stderr for r in ran]
-    return [json.loads(text) for text in (here.getvalue(), *(r.stdout for r in ran))]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["simulate", "runge_kutta_4", "reconstruct", "track"])
-def test_every_target_is_disturbed_by_so_much(shown, name):
-    plain, first, second = (np.array(values[name]) for values in shown)
-    apart = np.abs(first - plain)[plain != 0] / np.abs(plain[plain != 0])
-    assert SIZE / 3 < np.sqrt(np.nanmean(apart**2)) < 3 * SIZE
-    assert not np.array_equal(first, second, equal_nan=True)
-
-
 HAIR = """\
 profile: str = "full"  # full or quick
 from vidsindy_lite.study import SYSTEMS
@@ -124,12 +72,3 @@ def test_what_holds_by_a_hair_fails(tmp_path, shared_cache):
     assert run_quickly(hair, tmp_path, {}, shared_cache) == ""
     assert "AssertionError" in run_quickly(hair, tmp_path, {}, shared_cache, seed=1)
     assert "colour: must be" in run_quickly(hair, tmp_path, {"colour": 1}, shared_cache)
-
-
-@pytest.mark.slow
-def test_disturbed_sweeps_find_no_results_of_others(shared_cache):
-    show = "import os; print(os.environ['VIDSINDY_CACHE'])"
-    twice = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {show!r}])"
-    folders = {python("-c", show, cache=shared_cache, seed=seed).stdout for seed in (None, 1, 2)}
-    assert len(folders) == 3
-    assert python("-c", twice, cache=shared_cache, seed=1).stdout in folders

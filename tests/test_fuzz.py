@@ -173,30 +173,21 @@ def often(examples):
     return settings(max_examples=examples, suppress_health_check=list(HealthCheck))
 
 
-def check_call(name, data):
-    call, known = METHODS.get(name) or (getattr(vl, name), RIGHT[name]())
-    tried(call, known, data.draw)
+def check(name, folder, data):
+    """A call with odd arguments, or a file of odd content."""
+    if name in READERS:
+        read, contents = READERS[name]
+        (folder / name).write_bytes(data.draw(contents))
+        clear(read, folder / name)
+    else:
+        tried(*(METHODS.get(name) or (getattr(vl, name), RIGHT[name]())), data.draw)
 
 
-def check_reader(name, folder, data):
-    read, contents = READERS[name]
-    path = folder / name
-    path.write_bytes(data.draw(contents))
-    clear(read, path)
-
-
-@pytest.mark.parametrize("name", [*RIGHT, *METHODS])
+@pytest.mark.parametrize("name", [*RIGHT, *METHODS, *READERS])
 @often(12)
 @given(data=st.data())
-def test_odd_calls(name, data):
-    check_call(name, data)
-
-
-@pytest.mark.parametrize("name", READERS)
-@often(12)
-@given(data=st.data())
-def test_odd_files(name, tmp_path_factory, data):
-    check_reader(name, tmp_path_factory.getbasetemp(), data)
+def test_odd_ones(name, tmp_path_factory, data):
+    check(name, tmp_path_factory.getbasetemp(), data)
 
 
 @pytest.mark.thorough
@@ -204,7 +195,4 @@ def test_odd_files(name, tmp_path_factory, data):
 @often(150)
 @given(data=st.data())
 def test_many_odd_ones(name, tmp_path_factory, data):
-    if name in READERS:
-        check_reader(name, tmp_path_factory.getbasetemp(), data)
-    else:
-        check_call(name, data)
+    check(name, tmp_path_factory.getbasetemp(), data)

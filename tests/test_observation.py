@@ -1,10 +1,13 @@
-"""What tracks tell of a path, with lags that are given."""
+"""What tracks tell of a path with lags that are given, and what is wrong where they tell none."""
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import vidsindy_lite as vl
 from vidsindy_lite import cameras, study
+from vidsindy_lite.pipeline import Refused, refusing
 
 
 @pytest.fixture(scope="module")
@@ -24,13 +27,6 @@ def test_a_hopeless_lag_is_named(case, lag):
     )
     with pytest.raises(ValueError, match=message):
         vl.observe_tracks(tracks, rig, np.arange(150), lags=(0, 0, lag))
-
-
-def test_a_track_of_nothing_is_named(case):
-    rig, (first, second, third) = case
-    tracks = [first, np.full_like(second, np.nan), third]
-    with pytest.raises(ValueError, match=r"tracks\[1\]: must see the target in some frame"):
-        vl.observe_tracks(tracks, rig, np.arange(150))
 
 
 def test_a_view_along_the_motion_helps_though_its_lag_is_not_told():
@@ -94,3 +90,71 @@ def test_synchronous_cameras_have_no_lags_and_no_others_are_tried(case, monkeypa
     assert seen.lags.agree
     with pytest.raises(ValueError, match="lags: must be one of synchronous, got 'together'"):
         vl.observe_tracks(tracks, rig, np.arange(150), lags="together")
+
+
+# ------------------------------------------ where to look first when tracks lead to no law
+
+LOOP = np.column_stack((np.cos(np.arange(200) / 9), np.sin(np.arange(200) / 7))) * 90 + 200
+
+
+def causes(step, *tracks):
+    names = [f"{letter}.mp4" for letter, _ in zip("abc", tracks, strict=False)]
+    with pytest.raises(Refused) as caught, refusing(step, tracks, names):
+        raise ValueError("what is wrong")
+    assert caught.value.step == step
+    assert len(caught.value.tracks) == len(tracks)
+    said, order = str(caught.value).split("; likely causes, in this order: ")
+    assert said == "what is wrong"
+    return order
+
+
+def test_good_tracks_accuse_the_rig_or_the_lags():
+    assert causes("cameras", LOOP, LOOP) == "the rig, the lags, the tracker"
+    assert causes("lags", LOOP, LOOP) == "the lags, the rig, the tracker"
+
+
+def strange(kind):
+    rng, track = np.random.default_rng(0), LOOP.copy()
+    if kind == "jumps":
+        track[rng.permutation(200)[:20]] = 5.0
+    elif kind == "trembles":
+        track = track + 60 * rng.normal(size=track.shape)
+    elif kind == "stands still":
+        track = 200 + 0.2 * rng.normal(size=track.shape)
+    else:
+        track[40:] = np.nan
+    return track
+
+
+@pytest.mark.parametrize(
+    ("kind", "step"),
+    [("jumps", "lags"), ("trembles", "cameras"), ("stands still", "law"), ("is missing", "law")],
+)
+def test_a_strange_track_accuses_the_tracker(kind, step):
+    order = causes(step, LOOP, strange(kind))
+    assert order == "the tracker (look at b.mp4), the lags, the rig"
+
+
+@given(st.integers(0, 3), st.integers(0, 2**31))
+def test_any_track_is_judged(rows, seed):
+    rng = np.random.default_rng(seed)
+    track = np.where(rng.random((rows, 1)) < 0.5, np.nan, rng.normal(size=(rows, 2)))
+    assert "the tracker" in causes("law", track)
+
+
+def test_an_interruption_holds_the_tracks_and_is_no_error_to_be_caught():
+    with pytest.raises(KeyboardInterrupt) as caught, refusing("law", [LOOP], ["a"]):
+        raise KeyboardInterrupt
+    assert caught.value.step == "law"
+    np.testing.assert_array_equal(caught.value.tracks[0], LOOP)
+    with pytest.raises(OSError, match="disk"), refusing("law", [LOOP], ["a"]):
+        raise OSError("disk")
+
+
+def test_tracks_of_which_nothing_can_be_learned_come_with_the_refusal(case):
+    rig, (first, _, third) = case
+    tracks = [first, np.full((150, 2), 200.0), third]
+    with pytest.raises(Refused, match=r"must determine .* \(look at tracks.1") as caught:
+        vl.discover_from_tracks(tracks, rig.uncalibrated(0), np.arange(150), lags="synchronous")
+    assert caught.value.step == "cameras"
+    np.testing.assert_array_equal(caught.value.tracks[1], tracks[1])

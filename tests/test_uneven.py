@@ -9,6 +9,7 @@ import vidsindy_lite as vl
 from vidsindy_lite import study
 from vidsindy_lite.vision import render
 
+SIZE = (320, 320)
 RATE = 30.0  # frames a second
 LATER = (0, 0.21, 0.0)  # seconds by which each camera starts later
 
@@ -19,7 +20,7 @@ def motion():
     truth = study.SYSTEMS["Lorenz"].shift(study.REFERENCE_OFFSET)
     t, x = truth.trajectory(3600, 800)  # a frame of an even camera is eight of its rows
     unit = RATE * (t[8] - t[0])
-    return truth, CubicSpline(t / unit, x), vl.Rig.around(x), unit
+    return truth, CubicSpline(t / unit, x), vl.Rig.around(x, SIZE), unit
 
 
 def filmed(motion, clocks):
@@ -51,8 +52,8 @@ def test_tracks_by_their_own_clocks_give_the_path(motion):
 @pytest.mark.slow
 def test_the_law_of_a_phones_films_is_exact(motion, tmp_path):
     rng = np.random.default_rng(5)
-    clocks = [waver(rng, 350) for _ in range(3)]
-    scene, paths = vl.Scene("sea", size=16), []
+    clocks = [waver(rng, 300) for _ in range(3)]
+    scene, paths = vl.Scene("sea", size=12, image_size=SIZE), []
     for i, track in enumerate(filmed(motion, clocks)):
         frames = render(track, scene, seed=i)
         paths.append(

@@ -1,4 +1,4 @@
-"""The wheel: it holds its data, and its commands run where there is no repository."""
+"""The wheel: it holds its data, its commands run where there is no repository; and Binder."""
 
 import os
 import shutil
@@ -74,3 +74,24 @@ def test_the_demo_runs_outside_the_repository_with_few_libraries(python, tmp_pat
     where = [str(python), "-c", "import vidsindy_lite; print(vidsindy_lite.__file__)"]
     ran = subprocess.run(where, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert Path(ran.stdout.strip()).is_relative_to(python.parent.parent)
+
+
+def test_binder_takes_the_python_of_the_nightly_run():
+    runtime = (ROOT / "binder" / "runtime.txt").read_text().strip()
+    workflow = (ROOT / ".github" / "workflows" / "figures.yml").read_text()
+    assert runtime.replace("python-", 'python-version: "') + '"' in workflow
+    assert {path.name for path in (ROOT / "binder").iterdir()} == {
+        "runtime.txt",
+        "requirements.txt",
+    }
+
+
+@pytest.mark.slow
+def test_binder_installs_these_versions_and_the_package():
+    command = [sys.executable, "-m", "pip", "install", "--dry-run", "--no-deps", "--no-index"]
+    command += ["--no-build-isolation", "-r", "binder/requirements.txt"]
+    done = subprocess.run(
+        command, cwd=ROOT, env=os.environ | {"PYTHONPATH": ""}, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1].split("-")[0] == "Would install vidsindy_lite"

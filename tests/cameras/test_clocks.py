@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.cameras import Clock
-from vidsindy_lite.cameras.clocks import Lags, check_clocks, check_lags, check_rates
+from vidsindy_lite.cameras.clocks import Lags
 
 
 def test_the_times_of_each_track_are_checked():
@@ -18,9 +18,7 @@ def test_the_times_of_each_track_are_checked():
     assert Clock.of_tracks(np.arange(4) / 30, tracks).uneven is None
     with pytest.raises(ValueError, match=r"t: must have shape \(5,\), one per row of tracks\[1\]"):
         Clock.of_tracks([range(4), range(4)], tracks)
-
-
-def test_one_clock_for_all_tracks():
+    # One clock for all of them.
     clock = Clock.of_tracks([3.0, 3.5, 4.0], [np.zeros((3, 2)), np.zeros((5, 2))])
     assert clock.times.tolist() == [3.0, 3.5, 4.0]
     assert clock.rates.tolist() == [1, 1]
@@ -74,18 +72,6 @@ def test_given_times_are_those_of_an_uneven_file_but_for_a_quarter_of_a_frame(of
     else:
         with pytest.raises(ValueError, match="got 0.0219167 after the first for frame 3"):
             Clock.of_videos([30], [frames], times)
-
-
-RNG = np.random.default_rng(0)
-TRACKS = [np.cumsum(RNG.normal(size=(n, 2)), axis=0) for n in (9, 8)]
-
-
-def test_everything_counts_from_the_first():
-    assert check_lags("lags", (3, 5.5, -1), 3).tolist() == [0, 2.5, -4]
-    assert check_rates((2, 1, 5), 3).tolist() == [1, 0.5, 2.5]
-    first, second = check_clocks((5 + np.arange(9), 7.5 + np.arange(8) * 2), TRACKS)
-    assert first.tolist() == list(range(9))
-    assert second.tolist() == list(range(0, 16, 2))
 
 
 def test_a_frame_is_that_of_the_instant():

@@ -64,7 +64,7 @@ def test_depth_is_not_seen(small):
         np.testing.assert_allclose(nearer.project(x), track, atol=1e-9)
 
 
-def test_is_frozen_and_normalises():
+def test_a_camera_is_frozen_normalises_and_has_a_hash():
     camera = OrthographicCamera(position=[1, 2, 3], normal=[0, 3, 4])
     np.testing.assert_allclose(camera.normal, [0, 0.6, 0.8], rtol=1e-15)
     assert not camera.is_calibrated
@@ -78,9 +78,6 @@ def test_is_frozen_and_normalises():
     camera = OrthographicCamera(position=position, normal=[0, 0, 1])
     position[0] = 9
     assert camera.position[0] == 0
-
-
-def test_hash_agrees_with_equality():
     camera = OrthographicCamera(position=[1, 2, 0.0], normal=[0, 3, 4], scale=1, angle=0)
     twin = OrthographicCamera(position=(1, 2, -0.0), normal=(0, 3.0, 4), scale=1.0, angle=-0.0)
     assert camera == twin
@@ -94,11 +91,8 @@ def test_hash_agrees_with_equality():
     [
         ({"position": (1, 2, np.inf)}, "position: must be 3 finite numbers, got"),
         ({"normal": (0, 0, 0)}, "normal: must not be the zero vector, got"),
-        ({"normal": "up"}, "normal: must be an array of real numbers, got 'up'"),
         ({"angle": None}, "scale and angle: give both .* or neither .* got scale=1.0, angle=N"),
         ({"scale": 0}, "scale: must be positive, got 0"),
-        ({"scale": -1}, "scale: must be positive, got -1"),
-        ({"scale": True}, "scale: must be a finite number, got True"),
         ({"angle": "left"}, "angle: must be a finite number, got 'left'"),
         ({"image_size": (512, 0)}, r"image_size: must be two integers .*, got \(512, 0\)"),
         ({"principal_point": (1, 2, 3)}, "principal_point: must be 2 finite numbers, got"),
@@ -117,16 +111,6 @@ def test_bad_camera(change, message):
         PerspectiveCamera(**good | change)
     short = PerspectiveCamera(**good, distortion=(-0.1, 0.02))
     assert short.distortion.tolist() == [-0.1, 0.02, 0, 0, 0]
-
-
-def test_bad_points(small):
-    camera = small[1].cameras[0]
-    with pytest.raises(ValueError, match=r"x: must have shape \(n, 3\), got \(4, 2\)"):
-        camera.project(np.zeros((4, 2)))
-    with pytest.raises(ValueError, match="x: must be finite or NaN, got 1 infinite values"):
-        camera.project([[0, np.inf, 0]])
-    with pytest.raises(ValueError, match=r"pixels: must have shape \(n, 2\), got \(2,\)"):
-        camera.plane_coordinates([1, 2])
 
 
 def test_pixels_of_an_oblong_image_and_back():
@@ -167,18 +151,9 @@ def test_rotation_to_z_is_a_rotation_of_the_normal_to_z(normal):
     np.testing.assert_allclose(rotation[2], unit, atol=1e-14)
 
 
-def test_rotation_to_z_by_hand():
-    np.testing.assert_allclose(
-        rotation_to_z([1, 0, 0]), [[0, 0, -1], [0, 1, 0], [1, 0, 0]], atol=1e-15
-    )
-    np.testing.assert_allclose(
-        rotation_to_z([0, 1, 0]), [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-15
-    )
+def test_rotation_to_z_at_and_near_the_z_axis():
     np.testing.assert_array_equal(rotation_to_z([0, 0, 2]), np.eye(3))
     np.testing.assert_allclose(rotation_to_z([0, 0, -2]), np.diag([1, -1, -1]), atol=1e-15)
-
-
-def test_accurate_near_the_z_axis():
     for tilt in 10.0 ** np.arange(-300, 0, 23):
         rotation = rotation_to_z([tilt, -2 * tilt, 1])
         np.testing.assert_allclose(rotation, np.eye(3), atol=2.5 * tilt)
@@ -217,15 +192,22 @@ def test_planes_and_distances_by_hand():
             plane_through((0, 0, 0), (size, size, 0), (3 * size, 3 * size, 1e-13 * size))
 
 
+UNKNOWN = PerspectiveCamera(position=(0, 0, 1), normal=(0, 0, 1))
+AT_REST = OrthographicCamera(position=(0, 0, 0), normal=(0, 0, 1), scale=1, angle=0)
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
+        (lambda: AT_REST.project(np.zeros((4, 2))), r"x: must have shape \(n, 3\), got \(4, 2\)"),
+        (lambda: AT_REST.project([[0, np.inf, 0]]), "x: must be finite or NaN, got 1 infinite"),
+        (lambda: AT_REST.plane_coordinates([1, 2]), r"pixels: must have shape \(n, 2\), got \(2,"),
+        (lambda: UNKNOWN.project(np.eye(3)), "scale and angle must be known, got None"),
+        (lambda: UNKNOWN.plane_coordinates(np.eye(2)), "scale and angle must be known, got None"),
+        (lambda: UNKNOWN.focal_length, "scale and angle must be known"),
         (lambda: rotation_to_z([0, 0, 0]), "normal: must not be the zero vector, got"),
-        (lambda: rotation_to_z([1, 2]), "normal: must be 3 finite numbers, got"),
         (lambda: rodrigues([0, 0, 0], 1.0), "axis: must not be the zero vector, got"),
-        (lambda: rodrigues([0, 0, 1], np.inf), "angle: must be a finite number, got inf"),
         (lambda: plane_projection([1, 2], [0, 0, 1], 0), r"x: must have shape \(\.\.\., 3\), got"),
-        (lambda: signed_distance(1.0, [0, 0, 1], 0), r"x: must have shape \(\.\.\., 3\), got"),
         (lambda: plane_through((0, 0, 0), (1, 1, 1), (2, 2, 2)), "must not lie on one line"),
     ],
 )
@@ -281,17 +263,6 @@ def test_agrees_with_opencv(seed):
     assert pickle.loads(pickle.dumps(camera)) == camera  # though it is used
 
 
-def test_where_the_model_folds_there_is_no_ideal_image():
-    # With k1 = -1/3 the image of the radius r is r - r^3/3, largest (2/3) at r = 1.
-    coefficients = np.array([-1 / 3, 0, 0, 0, 0])
-    points = np.array([[0.6, 0.0], [0.66, 0.0], [0.7, 0.0], [np.nan, 0.0]])
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        found = undistorted(points, coefficients)
-    assert np.isnan(found).all(axis=1).tolist() == [False, False, True, True]
-    np.testing.assert_allclose(distorted(found[:2], coefficients)[0], points[:2], atol=1e-13)
-
-
 @pytest.mark.parametrize(("power", "which"), [(1, 0), (2, 1), (3, 4)])
 def test_every_power_of_the_radius_folds_where_its_image_is_largest(power, which):
     # With k = -1/(2p + 1) the image of the radius r is r + k r^(2p + 1), largest at r = 1.
@@ -300,9 +271,12 @@ def test_every_power_of_the_radius_folds_where_its_image_is_largest(power, which
     largest = 1 - 1 / (2 * power + 1)
     radii = np.array([0.5, 0.9, 0.999])
     points = np.outer(radii * (1 + coefficients[which] * radii ** (2 * power)), [0.6, -0.8])
-    found = undistorted(points, coefficients)
+    with warnings.catch_warnings(action="error"):
+        found = undistorted(points, coefficients)
+        none = undistorted(np.array([[0.0, 1.001 * largest], [np.nan, 0]]), coefficients)
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), radii, rtol=1e-9)
-    assert np.isnan(undistorted(np.array([[0.0, 1.001 * largest]]), coefficients)).all()
+    np.testing.assert_allclose(distorted(found, coefficients)[0], points, atol=1e-13)
+    assert np.isnan(none).all()
 
 
 @given(SEEDS)

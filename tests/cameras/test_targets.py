@@ -131,16 +131,13 @@ def test_where_two_orders_go_on_about_as_smoothly_nobody_is_sure():
     assert all(np.isnan(track[t > 0]).all() for track in told.tracks)
 
 
-def test_views_that_never_show_all_targets_at_once_are_refused():
+def test_views_that_never_show_all_targets_at_once_or_other_things_are_refused():
     rig, _, tracks = two_walks(6)
     tracks = [track.reshape(FRAMES, -1) for track in tracks]
     tracks[0][: FRAMES // 2] = np.nan
     tracks[1][FRAMES // 2 :] = np.nan
     with pytest.raises(ValueError, match="targets: all views must show all targets apart"):
         identify(tracks, rig)
-
-
-def test_tracks_of_other_things_fit_no_rig():
     rng = np.random.default_rng(7)
     rig = room(rng)
     tracks = [

@@ -1,16 +1,19 @@
-"""The report: complete, readable without network, and whole or not there."""
+"""The report, the film of the law and the page of pick: whole, and readable without network."""
 
+import io
 import json
 import os
 import re
 import shutil
 import subprocess
 import sys
+import tomllib
 import warnings
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
+import av
 import jsonschema
 import matplotlib.pyplot as plt
 import numpy as np
@@ -19,11 +22,22 @@ from browser import CHROMIUM, Browser
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
+from vidsindy_lite.__main__ import main
 from vidsindy_lite.cameras import Lags
 from vidsindy_lite.companion import report
-from vidsindy_lite.companion.report import FILES, check_folder_is_free, write_refusal, write_report
+from vidsindy_lite.companion.report import (
+    FILES,
+    FRAMES,
+    check_folder_is_free,
+    law_over_videos,
+    write_pick_page,
+    write_refusal,
+    write_report,
+)
 from vidsindy_lite.pipeline import Observation, Refused
 from vidsindy_lite.vision import read_tracks
+
+needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here to open the page in")
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +86,7 @@ class Parser(HTMLParser):
         assert self.open.pop() == tag
 
 
-def test_the_page_needs_nothing_else(page):
+def test_the_page_tells_law_verdict_and_cameras_and_needs_nothing_else(page, case):
     parser = Parser()
     text = page.read_text(encoding="utf-8")
     parser.feed(text)
@@ -83,11 +97,7 @@ def test_the_page_needs_nothing_else(page):
     assert kinds.count("data:video/webm;base64") == 1
     assert not re.search(r"https?:|@import|<script|<link", text)
     assert len(text) < 3_000_000
-
-
-def test_the_page_tells_law_verdict_and_cameras(page, case):
     found, _ = case
-    text = page.read_text(encoding="utf-8")
     for frame in ("data", "native"):
         assert found.discovery.equations(frame) in text
     assert "No reason for doubt was found." in text
@@ -122,18 +132,16 @@ def test_the_data_are_those_of_the_law(page, case):
     assert {path.name for path in page.parent.iterdir()} == set(FILES)
 
 
-@pytest.fixture
-def undrawn(monkeypatch):
-    """Reports without pictures: for tests of their files."""
-    monkeypatch.setattr(report, "_figures", lambda *_: iter(()))
-
-
 OLD = "<title>Law of a moving target</title> old"
 
 
 @pytest.fixture
-def old(tmp_path):
-    """A folder with an earlier report, as a link to where it is, and a file of somebody's."""
+def old(tmp_path, monkeypatch):
+    """A folder with an earlier report, as a link to where it is, and a file of somebody's.
+
+    Without pictures: it is for tests of the files.
+    """
+    monkeypatch.setattr(report, "_figures", lambda *_: iter(()))
     (tmp_path / "there").mkdir()
     (tmp_path / "report").symlink_to(tmp_path / "there")
     (tmp_path / "there" / "report.html").write_text(OLD)
@@ -141,12 +149,7 @@ def old(tmp_path):
     return tmp_path / "report"
 
 
-def assert_old(folder):
-    assert (folder / "report.html").read_text() == OLD
-    assert sorted(path.name for path in folder.iterdir()) == ["report.html", "thesis.tex"]
-
-
-def test_an_earlier_report_is_replaced_and_nothing_else(case, old, undrawn):
+def test_an_earlier_report_is_replaced_and_nothing_else(case, old):
     inode = old.stat().st_ino
     write_report(case[0], None, old)
     assert {path.name for path in old.iterdir()} == {*FILES, "thesis.tex"}
@@ -156,28 +159,24 @@ def test_an_earlier_report_is_replaced_and_nothing_else(case, old, undrawn):
     assert sorted(path.name for path in old.parent.iterdir()) == ["report", "there"]
 
 
-def test_a_report_that_fails_leaves_what_was_there(case, old):
-    found, paths = case
-    with pytest.raises(FileNotFoundError, match="gone"):
-        write_report(found, [*paths[:2], old / "gone.mov"], old)
-    assert_old(old)
-
-
-@pytest.mark.parametrize("call", ["write_bytes", "replace"])
-def test_a_full_disk_leaves_what_was_there(case, old, tmp_path, undrawn, monkeypatch, call):
+@pytest.mark.parametrize("call", ["write_bytes", "replace", None])
+def test_a_report_that_fails_leaves_what_was_there(case, old, tmp_path, monkeypatch, call):
     def full(path, *rest):
         raise OSError(28, "No space left on device", str(path))
 
+    found, paths = case
     with monkeypatch.context() as patch:
-        patch.setattr(Path, call, full)
+        if call:
+            patch.setattr(Path, call, full)
         for folder in (old, tmp_path / "new"):
-            with pytest.raises(OSError, match="No space left on device"):
-                write_report(case[0], None, folder)
-    assert_old(old)
+            with pytest.raises(OSError, match="No space left on device|gone"):
+                write_report(found, None if call else [*paths[:2], old / "gone.mov"], folder)
+    assert (old / "report.html").read_text() == OLD
+    assert sorted(path.name for path in old.iterdir()) == ["report.html", "thesis.tex"]
     assert not (tmp_path / "new").exists()
 
 
-def test_what_a_killed_run_has_left_is_cleared_by_the_next(case, old, undrawn):
+def test_what_a_killed_run_has_left_is_cleared_by_the_next(case, old):
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
     for name in FILES:
@@ -257,13 +256,10 @@ def test_of_tracks_alone_a_doubted_law_in_turned_axes(case, tmp_path, monkeypatc
     assert "<td>camera 2</td>" in page
 
 
-def test_the_schema_describes_the_data(page):
+def test_the_schema_describes_the_data_and_the_tracks_can_be_read_again(page, case):
     data = checked(page.parent)
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(data | {"status": "sure"}, described())
-
-
-def test_the_tracks_can_be_read_again(page, case):
     tracks = read_tracks(page.parent / "tracks.csv")
     for ours, theirs in zip(tracks, case[0].tracks, strict=True):
         np.testing.assert_allclose(ours.pixels, theirs, rtol=1e-9)
@@ -293,7 +289,7 @@ def test_a_refusal_shows_the_tracks_and_the_step(case, tmp_path, with_videos):
     np.testing.assert_allclose(read_tracks(page.parent / "tracks.csv")[0].pixels, tracks[0])
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here to open the page in")
+@needs_chromium
 def test_a_telephone_shows_the_report_without_scrolling_sideways(page, case, tmp_path):
     found, paths = case
     tracks = [track[:20] for track in found.tracks]
@@ -305,3 +301,127 @@ def test_a_telephone_shows_the_report_without_scrolling_sideways(page, case, tmp
             seen = browser.open(one, 390)
             assert seen["width"] <= 390
             assert (seen["errors"], seen["requests"], seen["broken"]) == ([], [], [])
+
+
+# -------------------------------------------------- the film of the law, and the page of pick
+
+LATER = 4  # frames
+
+
+def observed(tmp_path, frames):
+    """Two films of a motion, the second of which starts later, and its law."""
+    truth = study.SYSTEMS["SprottE"].shift(study.REFERENCE_OFFSET)
+    t, x = truth.trajectory(frames)
+    rig = vl.Rig.around(x, image_size=(270, 270))
+    tracks = [camera.project(x) for camera in rig.cameras[:2]]
+    scene = vl.Scene(background="plain", size=12, image_size=(270, 270))
+    paths = [vl.render_video(tmp_path / "a.mov", tracks[0], scene)]
+    paths.append(vl.render_video(tmp_path / "b.mov", tracks[1][LATER:], scene))
+    tracks[1][:LATER] = np.nan
+    lags = Lags(np.array([0.0, LATER]), np.ones(2), np.zeros(2), 0.0)
+    rig = vl.Rig(rig.cameras[:2])
+    seen = Observation(tuple(tracks), rig, lags, t, x, np.empty((0, *x.shape)), ())
+    return vl.VideoDiscovery(**vars(seen), discovery=vl.discover(t, x, degree=2)), paths
+
+
+def decoded(film):
+    with av.open(io.BytesIO(film)) as container:
+        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+
+
+def test_the_law_is_drawn_where_the_target_is(tmp_path):
+    found, paths = observed(tmp_path, 150)
+    frames = decoded(law_over_videos(found, paths))
+    assert len(frames) == 150
+    assert frames[0].shape == (270, 540, 3)
+    for k in (0, LATER, 77, 149):
+        for i, (path, start) in enumerate(zip(paths, (0, LATER), strict=True)):
+            view = frames[k][:, 270 * i : 270 * (i + 1)].astype(int)
+            raw = vl.read_frame(path, k - start) if k >= start else np.full((270, 270, 3), 128)
+            v, u = np.nonzero(np.abs(view - raw).max(axis=2) > 60)
+            ring = found.rig.cameras[i].project(found.x[[k]])[0]
+            assert np.hypot(u - ring[0], v - ring[1]).min() < 10
+    assert len(law_over_videos(found, paths)) < 1_000_000
+
+
+def test_a_long_film_is_shown_in_steps(tmp_path):
+    found, paths = observed(tmp_path, 201)
+    assert len(decoded(law_over_videos(found, paths))) == 101
+
+
+@pytest.fixture(scope="module")
+def videos(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("videos")
+    scene = vl.Scene(background="plain", size=10, image_size=(160, 120))
+    track = np.linspace([30, 40], [120, 90], 60)
+    return [vl.render_video(folder / name, track, scene) for name in ("a.mov", "<弾む 球>.mov")]
+
+
+def test_one_page_holds_all(videos, tmp_path):
+    text = write_pick_page(videos, tmp_path / "pick.html").read_text("utf-8")
+    assert "&lt;弾む 球&gt;.mov" in text
+    assert "<弾" not in text
+    assert text.count("data:image/jpeg;base64,") == 2 * FRAMES
+    assert not re.search(r"https?:|@import|<link|src=\"(?!data:)", text)
+    numbers = [int(number) for number in re.findall(r'data-frame="(\d+)"', text)]
+    assert (numbers[0], numbers[FRAMES - 1]) == (0, 59)
+
+
+def test_only_its_own_pages_are_replaced(videos, tmp_path):
+    out = tmp_path / "pick.html"
+    write_pick_page(videos[:1], out)
+    write_pick_page(videos, out)
+    other = tmp_path / "thesis.html"
+    other.write_text("mine")
+    for place in (other, tmp_path):
+        with pytest.raises(ValueError, match="out: must be a new file or an earlier page of pick"):
+            write_pick_page(videos, place)
+    assert other.read_text() == "mine"
+
+
+def test_the_command(videos, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["pick", *map(str, videos)]) == 0
+    assert capsys.readouterr().out == "open pick.html in a browser\n"
+    assert main(["pick", "none.mp4"]) == 2
+    assert "no such video file" in capsys.readouterr().err
+
+
+DRAG = """(() => {
+    const [section] = document.querySelectorAll("section");
+    const slider = section.querySelector("input"), view = section.querySelector(".view");
+    slider.value = SLIDER;
+    slider.dispatchEvent(new Event("input"));
+    const frame = view.getBoundingClientRect();
+    for (const [kind, u, v] of EVENTS) {
+        const clientX = frame.left + (u + 0.5) * frame.width / 160;
+        const clientY = frame.top + (v + 0.5) * frame.height / 120;
+        view.dispatchEvent(new PointerEvent(kind, {clientX, clientY, pointerId: 1, bubbles: true}));
+    }
+    return ["toml", "python"].map(kind => section.querySelector("." + kind).textContent);
+})()"""
+
+
+@needs_chromium
+@pytest.mark.parametrize(("width", "drawn"), [(390, "box"), (1280, "click")])
+def test_a_box_becomes_the_line_to_paste(videos, tmp_path, width, drawn):
+    page = write_pick_page(videos, tmp_path / "pick.html")
+    events = {
+        "box": [["pointerdown", 60, 70], ["pointermove", 30, 50], ["pointerup", 40, 50]],
+        "click": [["pointerdown", 50, 60], ["pointerup", 50, 60]],
+    }[drawn]
+    (tmp_path / "profile").mkdir()
+    with Browser(tmp_path / "profile") as browser:
+        seen = browser.open(page, width)
+        script = DRAG.replace("SLIDER", str(FRAMES - 1)).replace("EVENTS", str(events))
+        answer = browser.command("Runtime.evaluate", expression=script, returnByValue=True)
+    assert (seen["errors"], seen["requests"], seen["broken"]) == ([], [], [])
+    assert seen["width"] <= width
+    toml, python = answer["result"]["value"]
+    numbers = [float(number) for number in re.findall(r"-?[\d.]+", toml)]
+    assert numbers == [float(number) for number in re.findall(r"-?[\d.]+", python)]
+    assert re.fullmatch(r"target = \{ frame = 59, box = \[.*\] \}", toml)
+    hint = vl.Hint(**tomllib.loads(toml)["target"])  # as the rig file takes it
+    assert (hint.frame, list(hint.box)) == (59, numbers[1:])
+    expected = [40, 50, 20, 20] if drawn == "box" else [46, 56, 8, 8]
+    np.testing.assert_allclose(numbers[1:], expected, atol=0.11)

@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from helpers import noisy
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 import vidsindy_lite as vl
 from vidsindy_lite import Library, PolynomialSystem
-from vidsindy_lite.dynamics.library import Input, jumps
+from vidsindy_lite.dynamics.library import Input
 from vidsindy_lite.dynamics.result import Discovery
 
 T = np.linspace(0, 40, 600)
@@ -29,10 +28,6 @@ def duffing(t=T, start=(0.5, 0.0), push=lambda t, x: force(t)):
 
 FORCED = duffing()
 U = Library.inputs(T, {"u": force(T)})
-
-
-def noisy(x, noise, seed=0):
-    return x + noise * x.std(axis=0) * np.random.default_rng(seed).standard_normal(x.shape)
 
 
 def terms(law, equation):
@@ -160,19 +155,6 @@ def test_samples_that_jump_are_held_and_that_is_told():
     np.testing.assert_array_equal(told(s), relay(s))
     for hold in ("linear", "cubic"):  # who says so is not told
         assert not np.array_equal(Input.of("u", CLOCK, relay(CLOCK), hold)(s), relay(s))
-
-
-@given(st.lists(st.floats(0.01, 9.99), min_size=1, max_size=4), st.integers(50, 200))
-def test_jumps_are_found_where_they_are(times, n):
-    times = np.unique(times)
-    t = np.linspace(0, 10, n)
-    apart = np.unique(np.searchsorted(t, times)).size == times.size  # one an interval
-    found = jumps(lambda s: np.sin(s) + np.searchsorted(times, s, side="right"), t)
-    if apart:
-        np.testing.assert_allclose(found, times, atol=1e-6)
-    assert all(np.abs(times - one).min() < 1e-6 for one in found)
-    assert jumps(np.tanh, t).size == 0
-    assert jumps(lambda s: np.tanh(1e3 * (s - 5)), t).size == 0  # steep, and yet none
 
 
 def test_an_input_is_a_spline_and_unknown_outside():

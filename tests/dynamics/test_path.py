@@ -1,6 +1,5 @@
 """The path of laws: a first law, smooth errors, plateaus that compete, and which law persists."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,12 +8,8 @@ from scipy.interpolate import make_interp_spline
 
 from vidsindy_lite.dynamics import path as paths
 from vidsindy_lite.dynamics.bspline import Segment
-from vidsindy_lite.dynamics.data import check_trajectory
-from vidsindy_lite.dynamics.library import Library
-from vidsindy_lite.dynamics.model import Form, PolynomialSystem
+from vidsindy_lite.dynamics.model import PolynomialSystem
 from vidsindy_lite.dynamics.path import LARGEST
-from vidsindy_lite.dynamics.problem import pose
-from vidsindy_lite.dynamics.result import History, Plateau
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import (
     REFERENCE_OFFSET,
@@ -94,18 +89,17 @@ def test_errors_that_last_widen_the_error_bars(swing):
     one, nine = discover(t, x + white), discover(t, x + smooth)
     assert score(nine, DUFFING).exact
     live = one.system.support
-    assert (nine.standard_errors[live] > 2 * one.standard_errors[live]).all()
+    wider = nine.standard_errors[live] / one.standard_errors[live]  # by the root of nine
+    assert ((wider > 2) & (wider < 4.5)).all()
 
 
-def test_times_that_are_not_exact_do_not_become_terms(monkeypatch):
+def test_times_that_are_not_exact_do_not_become_terms():
     truth = SYSTEMS["SprottF"].shift(REFERENCE_OFFSET)
     t, x = truth.trajectory(600)
     x = corruption.jitter(x, 0.3, np.random.default_rng(3))
     found = discover(t, x)
     assert score(found, truth).exact
     assert found.status == "ok", found.warnings
-    monkeypatch.setattr(paths, "time_inflation", lambda fit: 1.0)
-    assert not score(discover(t, x), truth).exact
 
 
 def test_data_are_nearly_exact_if_their_coordinates_are_on_the_average():
@@ -114,31 +108,8 @@ def test_data_are_nearly_exact_if_their_coordinates_are_on_the_average():
     assert score(discover(data.t, data.x, order=1), data.truth).exact
 
 
-CIRCLE = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1}}, degree=2)
-
-
-def posed(times, degree=2):
-    runs = [check_trajectory(t, CIRCLE.simulate(t, (1, 0.5))) for t in times]
-    shared = [np.empty((*x.shape, 0)) for _, x in runs]
-    form = Form.of(("x", "y"), Library.polynomial(degree))
-    return pose(runs, shared, form, np.random.default_rng(0))
-
-
-def test_all_data_decide_on_the_terms_of_a_part(monkeypatch):
-    monkeypatch.setattr(paths, "ENOUGH_SAMPLES", 150)
-    monkeypatch.setattr(paths, "ENOUGH_TURNS", 2)
-    problem, history = posed([np.linspace(0, 60, 1500)]), History()
-    fit = paths.first_law(problem, history)
-    assert sum(len(s.t) for s in fit.collocation.segments) == 1500
-    assert "subset search, all data" in [step.stage for step in history.steps]
-    assert fit.state.active.sum() == 2
-
-
-@pytest.mark.parametrize(
-    ("flow", "seed"), [("SprottE", 7), pytest.param("SprottF", 51, marks=pytest.mark.thorough)]
-)
-def test_a_law_is_found_that_the_first_path_leads_past(flow, seed):
-    data = FlowContest(flow, "bent space 0.3 %", seed=seed).data()
+def test_a_law_is_found_that_the_first_path_leads_past():
+    data = FlowContest("SprottE", "bent space 0.3 %", seed=7).data()
     assert score(discover(data.t, data.x, degree=data.degree), data.truth).exact
 
 
@@ -153,65 +124,17 @@ def test_a_plateau_that_leaves_more_than_it_was_said_to_is_passed_over():
     assert found.noise < 1e-3 * x.std()
 
 
-@pytest.mark.parametrize("rounds", [1, 2])
-def test_every_loop_ends_where_no_path_leads_to_its_law(monkeypatch, rounds):
-    """A path that leads elsewhere each time: as many rounds as allowed, and the last law."""
-    problem = posed([np.linspace(0, 20, 400)])
-    fit, refits, refit = paths.first_law(problem, History()), [], paths.refit
-    monkeypatch.setattr(paths, "ROUNDS", rounds)
-    monkeypatch.setattr(paths, "has_terms", lambda fit, goal: False)
-    monkeypatch.setattr(paths, "deepest", lambda problem, path, history: path)
-    monkeypatch.setattr(paths, "refit", lambda *a: refits.append(a) or refit(*a))
-    *_, persists = paths.persistent(problem, fit, History())
-    assert len(refits) == rounds
-    assert not persists
-
-
-# ------------------------------------------------------------------------------------- across gaps
-
-
-def halves(size):
-    """A circle seen from 0 to 2 and, of another size, from 3 to 6."""
-    t = np.linspace(0, 6, 121)
-    x = np.stack([np.sin(t), np.cos(t)], axis=1)
-    x[t >= 3] *= size
-    segments = [Segment.even(t[s], x[s], 0.2, 0) for s in (t <= 2, t >= 3)]
-    splines = [make_interp_spline(s.t, s.x, 3) for s in segments]
-    jumps = [np.zeros(0)]
-    return SimpleNamespace(trajectories=[(t, x)], spacing=0.2, jumps=jumps), segments, splines
-
-
 def test_a_law_carries_both_sides_across_a_gap_where_they_are_blended():
-    problem, segments, splines = halves(2)
-    ((joined,), (curve,)) = paths.join(problem, segments, splines, CIRCLE, [(0, 2.0)])
+    """A circle seen from 0 to 2 and, twice as large, from 3 to 6."""
+    law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1}})
+    t = np.linspace(0, 6, 121)
+    x = np.stack([np.sin(t), np.cos(t)], axis=1) * np.where(t < 3, 1, 2)[:, None]
+    segments = [Segment.even(t[s], x[s], 0.2, 0) for s in (t <= 2, t >= 3)]
+    problem = SimpleNamespace(trajectories=[(t, x)], spacing=0.2, jumps=[np.zeros(0)])
+    splines = [make_interp_spline(s.t, s.x, 3) for s in segments]
+    ((joined,), (curve,)) = paths.join(problem, segments, splines, law, [(0, 2.0)])
     assert len(joined.t) == 121  # samples inside the gap, if any, come back
     inside = np.linspace(2, 3, 30)
     exact = (inside - 1)[:, None] * np.stack([np.sin(inside), np.cos(inside)], axis=1)
     np.testing.assert_allclose(curve(inside), exact, atol=1e-5)
-    outside = np.array([1.5, 4.5])
-    np.testing.assert_allclose(curve(outside), [splines[0](1.5), splines[1](4.5)])
-
-
-def test_a_law_that_blows_up_in_a_gap_leaves_the_curve_finite():
-    wild = PolynomialSystem.from_terms({"x": {"x^3": 1e3}, "y": {"x": -1}})
-    _, (curve,) = paths.join(*halves(1), wild, [(0, 2.0)])
-    assert np.isfinite(curve(np.linspace(2.1, 2.9, 40))).all()
-
-
-def test_gaps_come_shortest_first():
-    t = np.linspace(0, 10, 101)
-    cuts = [t <= 2, (t >= 4) & (t <= 5), (t >= 6) & (t <= 7), t >= 7.5]
-    segments = [Segment.even(t[s], np.sin(t[s])[:, None], 0.2, 0) for s in cuts]
-    assert paths.gaps(segments) == [(0, 7.0), (0, 5.0), (0, 2.0)]
-
-
-def test_plateaus_whose_law_misses_more_than_they_tolerate_are_passed_over():
-    problem = posed([np.linspace(0, 20, 400)])
-    fit = paths.first_law(problem, History())
-    path = paths.follow(problem, fit)
-    still = Plateau(0, path.lowest, LARGEST, np.zeros_like(path.plateaus[0][0].terms))
-    first, second = path.plateaus
-    promising = replace(path, plateaus=((still, *first), second))
-    assert not promising.widest()[0].terms.any()
-    found = paths.refit(problem, promising, History())
-    np.testing.assert_array_equal(found.state.active, fit.state.active)
+    np.testing.assert_allclose(curve([1.5, 4.5]), [splines[0](1.5), splines[1](4.5)])

@@ -44,17 +44,6 @@ def test_the_errors_cover_in_space():
     assert nine.radius_error > 1.7 * one.radius_error
 
 
-def test_whirling_has_no_leaps_and_what_is_missing_has_no_angle():
-    whirl = 4 * TIMES
-    x = bob(whirl)[:, [0, 2]]
-    x[100:120] = np.nan
-    circle = vl.on_circle(x / [0.6, 1.0], zero=(0, -1))
-    seen = np.isfinite(circle.angle)
-    assert seen.sum() == 380
-    assert np.diff(circle.angle[seen]).max() < 21 * 4 * TIMES[1] + 1e-9
-    assert abs(np.ptp(circle.angle[seen])) == pytest.approx(40, rel=1e-6)
-
-
 def test_a_sphere_has_two_angles():
     second = 0.5 * np.sin(2.1 * TIMES)
     x = 1.5 * np.stack(
@@ -150,7 +139,7 @@ def right_terms(law):
 
 @pytest.fixture(scope="module")
 def swung():
-    return vl.discover(FRAMES, swung_bob(1.5, 0.005))
+    return vl.discover(FRAMES[::2], swung_bob(1.5, 0.005)[::2])
 
 
 def test_a_bob_in_space_has_the_law_of_its_angle(swung):
@@ -177,16 +166,6 @@ def test_the_swing_is_printed_and_kept(swung, tmp_path):
     assert str(kept) == str(swung.swing)
     np.testing.assert_array_equal(kept.circle.angle, swung.swing.circle.angle)
     np.testing.assert_allclose(kept.law.predict([0.5, 0.1]), swung.swing.law.predict([0.5, 0.1]))
-
-
-def test_errors_that_last_do_not_hide_a_circle():
-    rng, errors = np.random.default_rng(5), np.zeros((len(FRAMES), 2))
-    for i in range(1, len(FRAMES)):
-        errors[i] = 0.78 * errors[i - 1] + 0.0015 * np.sqrt(1 - 0.78**2) * rng.standard_normal(2)
-    found = vl.discover(FRAMES, flat(swung_bob(0.5, 0.0003)) + errors, degree=2)
-    assert found.status == "suspect"
-    assert any("stays on a circle" in text for text in found.warnings)
-    assert found.swing is not None
 
 
 def swing_of(runs, shared=None):
@@ -242,7 +221,7 @@ def test_where_nothing_rests_the_angle_counts_from_the_middle():
 
 
 def test_no_swing_where_none_is_asked_for_or_none_is_there(swung):
-    t, x = FRAMES[::3], flat(swung_bob(1.5, 0.005))[::3]
+    t, x = FRAMES[:150], flat(swung_bob(1.5, 0.005))[:150]
     assert vl.discover(t, x, order=1, degree=1).swing is None
     assert vl.discover(t, x * [1, 0.7], order=2, degree=1).swing is None  # an ellipse
     assert vl.discover(t, x, order=2, library=SINES).swing is None

@@ -51,10 +51,10 @@ NAMED = {
 }
 
 
-def told(x, share=0.01, seed=0, t=TIMES, terms=2):
+def told(x, share=0.01, t=TIMES, terms=2):
     """What is said of positions with errors of a share of the widest coordinate."""
     noise = np.full(x.shape[1], share * x.std(axis=0).max())
-    noisy = x + noise * np.random.default_rng(seed).standard_normal(x.shape)
+    noisy = x + noise * np.random.default_rng(0).standard_normal(x.shape)
     return " | ".join(shapes([(t, noisy)], noise, "xyzw"[: x.shape[1]], np.full(x.shape[1], terms)))
 
 

@@ -5,8 +5,8 @@ import json
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from threading import Barrier, Thread
 
 import numpy as np
 import pytest
@@ -16,9 +16,10 @@ from tqdm import tqdm
 
 import vidsindy_lite
 from vidsindy_lite.dynamics import solver
+from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.model import PolynomialSystem
 from vidsindy_lite.dynamics.solver import discover, one_blas_thread
-from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, drop_fibers, score
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, score
 
 
 def measured(name, noise, n=600, seed=11):
@@ -36,7 +37,7 @@ def test_clean_systems_are_recovered_exactly(name):
     assert result.l2 < 1e-5
     assert score(found.native, SYSTEMS[name]).exact
     np.testing.assert_allclose(found.offset, REFERENCE_OFFSET, atol=1e-4)
-    assert found.status == "ok"
+    assert (found.status, found.note) == ("ok", "")
 
 
 @pytest.mark.parametrize("name", ["SprottE", "WangSun"])
@@ -62,6 +63,7 @@ def test_other_dimensions_and_uneven_times(name):
     t = np.sort(rng.uniform(0, duration, 400))
     found = discover(t, add_noise(truth.simulate(t, x0), 0.02, rng))
     assert score(found, truth).exact
+    assert found.status == "ok", found.warnings  # on a line a trajectory needs no turns
 
 
 TIED = {  # what is conserved ties the candidates together along the trajectory
@@ -91,13 +93,6 @@ def test_conserved_quantities_do_not_hide_the_law(name):
     assert score(discover(t, truth.simulate(t, x0), degree=degree), truth).exact
 
 
-def test_gaps_are_bridged():
-    truth, t, x = measured("Lorenz", 0.01, n=700)
-    found = discover(t, drop_fibers(x, 0.2, np.random.default_rng(4)))
-    assert score(found, truth).exact
-    assert len(found.curves) == 1
-
-
 @pytest.mark.parametrize(("kick", "bridges"), [(0.0, True), (0.03, False)])
 def test_a_gap_in_which_the_target_was_kicked_stays_open(kick, bridges):
     # The kick is small: of a chi-square of thousands it costs some hundreds.
@@ -122,16 +117,6 @@ def test_what_was_seen_in_a_row_counts(missing, noise):
     assert result.exact
     assert result.l2 < 1e-4 + noise / 5
     assert found.status == "ok"
-
-
-def test_several_trajectories_share_one_law():
-    truth = SYSTEMS["Lorenz"]
-    rng = np.random.default_rng(3)
-    t = np.arange(250) * 0.015
-    runs = [truth.simulate(t, x0) for x0 in ((-8, 7, 27), (5, 5, 25), (1, -6, 20))]
-    found = discover([(t, add_noise(x, 0.02, rng)) for x in runs])
-    assert score(found, truth).exact
-    assert len(found.curves) == 3
 
 
 def test_units_do_not_matter():
@@ -207,36 +192,6 @@ def test_kicks_are_not_sought_when_the_time_is_over(monkeypatch):
 # -- warnings --------------------------------------------------------------------------------------
 
 
-def test_a_law_outside_the_library_is_suspected():
-    t = np.linspace(0, 40, 400)
-    duffing = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -3, "x^3": 4}})
-    x = add_noise(duffing.simulate(t, (0.7, 0)), 0.005, np.random.default_rng(0))
-    found = discover(t, x, degree=1)
-    assert found.status == "suspect"
-    assert any("outside the library" in warning for warning in found.warnings)
-
-
-def test_a_short_trajectory_is_suspected():
-    t = np.linspace(0, 2, 200)
-    x = np.stack([np.sin(t), np.cos(t)], axis=1)
-    found = discover(t, add_noise(x, 0.05, np.random.default_rng(0)))
-    assert any("turns of the motion" in warning for warning in found.warnings)
-
-
-def test_on_a_line_a_trajectory_needs_no_turns():
-    terms, x0, duration = PLANAR["growth"]
-    t = np.linspace(0, duration, 300)
-    law = PolynomialSystem.from_terms(terms)
-    assert discover(t, law.simulate(t, x0)).status == "ok"
-
-
-def test_a_coarse_trajectory_is_suspected():
-    t = 1.3 * np.arange(200)
-    x = np.stack([np.sin(t), np.cos(t)], axis=1)
-    found = discover(t, add_noise(x, 0.02, np.random.default_rng(0)), degree=1)
-    assert any("sample faster" in warning for warning in found.warnings)
-
-
 def test_pure_noise_gives_no_law_without_a_warning():
     x = np.random.default_rng(0).normal(size=(200, 2))
     found = discover(np.arange(200.0), x)
@@ -246,25 +201,23 @@ def test_pure_noise_gives_no_law_without_a_warning():
 # -- input ---------------------------------------------------------------------------------------
 
 
+NOISE = np.random.default_rng(0).normal(size=(200, 3))
+
+
 @pytest.mark.parametrize(
-    ("shape", "options", "message"),
+    ("x", "options", "message"),
     [
-        ((20, 3), {}, "x: must hold at least as many samples as unknowns"),
-        ((200, 1), {"degree": "3"}, "degree: must be"),
-        ((200, 1), {"time_limit": 0}, "time_limit: must be"),
-        ((200, 1), {"time_limit": "soon"}, "time_limit: must be"),
+        (NOISE[:20], {}, "x: must hold at least as many samples as unknowns"),
+        (NOISE * [1, 0, 1], {}, "x: every coordinate must move, got a constant column 1"),
+        (NOISE[:, :1], {"degree": "3"}, "degree: must be"),
+        (NOISE, {"degree": 2, "library": Library.fourier()}, "degree: must not be given with a li"),
+        (NOISE[:, :1], {"time_limit": 0}, "time_limit: must be"),
+        (NOISE[:, :1], {"time_limit": "soon"}, "time_limit: must be"),
     ],
 )
-def test_bad_input_is_refused(shape, options, message):
-    t, x = np.arange(shape[0]), np.random.default_rng(0).normal(size=shape)
+def test_bad_input_is_refused(x, options, message):
     with pytest.raises(ValueError, match=message):
-        discover(t, x, **options)
-
-
-def test_a_coordinate_that_stands_still_is_refused():
-    t = np.linspace(0, 10, 200)
-    with pytest.raises(ValueError, match="x: every coordinate must move, got a constant column 1"):
-        discover(t, np.stack([np.sin(t), np.ones_like(t)], axis=1))
+        discover(np.arange(len(x)), x, **options)
 
 
 # ------------------------------------------------------------------------------------------ threads
@@ -275,25 +228,13 @@ def threads():
 
 
 def test_a_discovery_has_one_thread_and_gives_back_what_was_there(monkeypatch):
-    began, second, within = Barrier(2), Barrier(2), []
-
-    def longer():
-        began.wait()
-        with one_blas_thread():
-            second.wait()  # the first one has ended
-            within.append(threads())
-
-    def first():
-        with one_blas_thread():
-            began.wait()
-            other.join(0.2)
-        second.wait()
-
-    with threadpool_limits(limits=2, user_api="blas"):
-        other = Thread(target=longer)
-        other.start()
-        first()
-        other.join()
+    here, there, within = one_blas_thread(), one_blas_thread(), []
+    with threadpool_limits(limits=2, user_api="blas"), ThreadPoolExecutor(1) as other:
+        here.__enter__()
+        other.submit(there.__enter__).result()
+        here.__exit__(None, None, None)
+        within.append(other.submit(threads).result())  # the other one has not ended
+        other.submit(there.__exit__, None, None, None).result()
         assert threads() == {2}
         monkeypatch.setattr(solver, "_of_order", lambda *_: within.append(threads()))
         discover(np.linspace(0, 10, 50), np.sin(np.linspace(0, 10, 50))[:, None])
@@ -303,8 +244,6 @@ def test_a_discovery_has_one_thread_and_gives_back_what_was_there(monkeypatch):
 
 # ----------------------------------------------------------------------------------------- rounding
 
-CASES = [("Lorenz", 0.0), ("SprottF", 0.1)]
-MORE = [(name, noise) for name in SYSTEMS for noise in (0.0, 0.02, 0.1, 0.2)]
 PROCESS = """
 import json, sys
 sys.path.insert(0, sys.argv[1])
@@ -313,42 +252,25 @@ print(json.dumps(outcome()))
 """
 
 
-def samples(name, noise, n=400):
-    t, x = SYSTEMS[name].shift(REFERENCE_OFFSET).trajectory(n)
-    return t, add_noise(x, noise, np.random.default_rng(8))
-
-
 def assert_same(coefficients, errors, others):
     live = coefficients != 0
     assert (live == (others != 0)).all()
     assert (np.abs(others - coefficients)[live] / errors[live]).max() < 0.01
 
 
-def check_disturbed(name, noise, n, draws):
-    t, x = samples(name, noise, n)
-    found = discover(t, x)
-    for draw in range(draws):
-        disturbed = x * (1 + 1e-9 * np.random.default_rng(draw).standard_normal(x.shape))
-        other = discover(t, disturbed)
-        assert_same(found.coefficients, found.standard_errors, other.coefficients)
-        assert other.status == found.status
-
-
-@pytest.mark.parametrize(("name", "noise"), CASES)
+@pytest.mark.parametrize(("name", "noise"), [("Lorenz", 0.0), ("SprottF", 0.1)])
 def test_a_disturbance_of_the_ninth_digit_does_not_count(name, noise):
-    check_disturbed(name, noise, n=400, draws=1)
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(("name", "noise"), MORE)
-def test_a_disturbance_of_the_ninth_digit_does_not_count_anywhere(name, noise):
-    check_disturbed(name, noise, n=800, draws=2)
+    _, t, x = measured(name, noise, n=400, seed=8)
+    disturbed = x * (1 + 1e-9 * np.random.default_rng(0).standard_normal(x.shape))
+    found, other = discover(t, x), discover(t, disturbed)
+    assert_same(found.coefficients, found.standard_errors, other.coefficients)
+    assert other.status == found.status
 
 
 def outcome():
     """A chaotic path as a digest; coefficients and standard errors of what is found."""
     path = hashlib.sha256(SYSTEMS["SprottF"].trajectory(800)[1].tobytes()).hexdigest()
-    found = discover(*samples("SprottF", 0.1))
+    found = discover(*measured("SprottF", 0.1, n=400, seed=8)[1:])
     return path, found.coefficients.tolist(), found.standard_errors.tolist()
 
 

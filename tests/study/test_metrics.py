@@ -4,12 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from vidsindy_lite.dynamics import Library, PolynomialSystem
-from vidsindy_lite.dynamics.solver import discover
-from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, cramer_rao_bound
+from vidsindy_lite.study import cramer_rao_bound
 from vidsindy_lite.study.metrics import pulls, score, term_errors, trajectory_error
 
 TRUTH = PolynomialSystem.from_terms({"x": {"x": 3}, "y": {"xy": -4, "1": 1}})
@@ -31,24 +28,8 @@ def test_counts_and_errors_of_a_case_done_by_hand():
     }
     assert errors == pytest.approx({("x", 0): 0.1, ("xy", 1): 0.0, ("1", 1): 1.0})
     assert result.max_coefficient_error == pytest.approx(1.0)
-
-
-@given(st.permutations(range(10)), st.integers(0, 2**32 - 1))
-def test_order_and_size_of_the_library_do_not_matter(order, seed):
-    rng = np.random.default_rng(seed)
-    full = PolynomialSystem.from_terms({"x": {"1": 1}, "y": {"1": 1}}, degree=3)
-    values = np.where(rng.random((10, 2)) < 0.5, rng.standard_normal((10, 2)), 0.0)
-    found = PolynomialSystem(full.names, full.exponents, values)
-    shuffled = PolynomialSystem(full.names, full.exponents[order], values[order])
-    used = values.any(axis=1)
-    small = PolynomialSystem(full.names, full.exponents[used], values[used])
-    expected = score(found, TRUTH)
-    for other in (shuffled, small):
-        result = score(other, TRUTH)
-        assert result.l2 == pytest.approx(expected.l2)
-        assert result.false_positives == expected.false_positives
-        assert result.missing == expected.missing
-        np.testing.assert_allclose(result.coefficient_errors, expected.coefficient_errors)
+    assert term_errors(found, TRUTH) == (["1 in dy/dt"], ["y in dx/dt"])
+    assert term_errors(TRUTH, TRUTH) == ([], [])
 
 
 def test_trajectory_error_of_a_known_displacement():
@@ -58,13 +39,6 @@ def test_trajectory_error_of_a_known_displacement():
     x[100:200] = np.nan
     x[300, 1] = np.nan
     np.testing.assert_allclose(trajectory_error(x, truth), [0.5, 0.1, 0.2])
-
-
-def test_terms_that_are_missing_or_false_by_name():
-    found = PolynomialSystem.from_terms({"x": {"x": 3.3, "y": 2}, "y": {"xy": -4}}, degree=3)
-    assert term_errors(found, TRUTH) == (["1 in dy/dt"], ["y in dx/dt"])
-    assert term_errors(TRUTH, found) == (["y in dx/dt"], ["1 in dy/dt"])
-    assert term_errors(TRUTH, TRUTH) == ([], [])
 
 
 def test_pulls_of_the_true_terms_that_were_found():
@@ -142,17 +116,3 @@ def test_a_nonlinear_law_in_the_plane_agrees_with_differences():
     ours = [bound.coefficients[at("y"), 0]]
     ours += [bound.coefficients[at(term), 1] for term in ("x", "y", "x^3")]
     np.testing.assert_allclose(ours, errors[2:], rtol=1e-4)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["Lorenz", "WangSun"])
-def test_standard_errors_of_a_discovery_are_the_bound(name):
-    system = SYSTEMS[name]
-    t, x = system.shift(REFERENCE_OFFSET).trajectory(600)
-    found = discover(t, add_noise(x, 0.05, np.random.default_rng(2)))
-    moving = np.array([True, True, False])
-    bound = cramer_rao_bound(system, t, system.x0, 0.05 * x.std(axis=0), moving)
-    assert (found.native.support == system.support).all()
-    ratio = found.native_standard_errors[system.support] / bound.coefficients[system.support]
-    assert (np.abs(np.log(ratio)) < np.log(1.3)).all()
-    assert found.offset_errors[moving] == pytest.approx(bound.offset[moving], rel=0.3)

@@ -1,4 +1,4 @@
-"""What figures and the animation of the tour show."""
+"""What figures show."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -59,28 +59,3 @@ def test_what_is_missing_is_shaded_over_time():
             ends = shade.get_paths()[0].vertices[:, 0]
             assert t[9] < ends.min() <= t[10]
             assert t[14] <= ends.max() < t[15]
-
-
-# ------------------------------------------------------------------------ the tour, as an animation
-
-
-FRAMES, MOMENTS = 30, np.array([0, 10, 29])
-
-
-def test_videos_and_path_grow_before_the_law_is_shown():
-    rng = np.random.default_rng(0)
-    films = [[np.full((64, 64, 3), 60 * k, np.uint8) for k in range(3)] for _ in range(3)]
-    tracks = [rng.uniform(0, 63, (FRAMES, 2)) for _ in range(3)]
-    path = rng.normal(size=(FRAMES, 3))
-    pictures = plots.draw_tour(films, MOMENTS, tracks, path, ["dx/dt = y"])
-    assert {(picture.shape, picture.dtype.name) for picture in pictures} == {
-        ((300, 900, 3), "uint8")
-    }
-    videos, law = pictures[: len(MOMENTS)], pictures[len(MOMENTS) :]
-    for before, after in zip(videos, videos[1:], strict=False):
-        changed = (before != after).any(axis=2)
-        assert changed[:220, :640].any()  # the videos
-        assert changed[:220, 640:].any()  # the path
-        assert not changed[230:, :640].any()
-    assert all((picture[:220] == videos[-1][:220]).all() for picture in law)
-    assert (law[0][230:] != videos[-1][230:]).any()

@@ -6,10 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from vidsindy_lite.dynamics import PolynomialSystem, clamped_knots, monomial_exponents, monomials
+from vidsindy_lite.dynamics import PolynomialSystem, clamped_knots, monomial_exponents
 from vidsindy_lite.study.metrics import score
-from vidsindy_lite.study.paper import SYSTEMS
-from vidsindy_lite.study.spline_ado import SplineADOSettings, _Fit, spline_ado, stridge
+from vidsindy_lite.study.spline_ado import SplineADOSettings, _Fit, spline_ado
 
 RANDOM = np.random.default_rng
 SHORT = {"pretraining": 200, "epochs": 100, "alternations": 2, "collocation_per_knot": 3}
@@ -95,20 +94,6 @@ def test_a_spiral_is_found_away_from_its_origin_and_across_a_gap(gap):
     np.testing.assert_array_equal(found.system.coefficients, kept)
 
 
-def test_history_goes_on_and_the_loss_falls():
-    t, x = spiral()
-    x = x + 0.02 * np.random.default_rng(0).standard_normal(x.shape)
-    history = spline_ado(t, x, degree=2, **SHORT).history
-    assert set(history[0]) == {"iteration", "seconds", "data_loss", "physics_loss", "terms"}
-    assert history[0]["iteration"] == 1
-    for name in ("iteration", "seconds"):
-        assert (np.diff([entry[name] for entry in history]) > 0).all()
-    assert history[0]["terms"] == 12
-    assert history[-1]["terms"] < 12
-    total = [entry["data_loss"] + entry["physics_loss"] for entry in history]
-    assert total[-1] < total[0]
-
-
 def test_equal_seeds_give_equal_laws():
     t, x = spiral(80)
     short = SHORT | {"pretraining": 20, "epochs": 20}
@@ -117,31 +102,6 @@ def test_equal_seeds_give_equal_laws():
     )
     np.testing.assert_array_equal(first, again)
     assert not np.array_equal(first, other)
-
-
-def lorenz_rows():
-    truth = SYSTEMS["Lorenz"]
-    _, x = truth.trajectory(600)
-    return truth, monomials(x, truth.exponents), truth(x)
-
-
-def test_stridge_recovers_lorenz_from_exact_derivatives():
-    truth, library, derivative = lorenz_rows()
-    found = stridge(library, derivative, np.random.default_rng(0))
-    assert ((found != 0) == truth.support).all()
-    np.testing.assert_allclose(found, truth.coefficients, rtol=1e-8)
-
-
-def test_the_refit_of_stridge_is_plain_least_squares_on_all_rows():
-    truth, library, derivative = lorenz_rows()
-    rng = np.random.default_rng(0)
-    noisy = derivative + rng.standard_normal(derivative.shape)
-    found = stridge(library, noisy, rng, sparsity_weight=1e-2)
-    for column, target in zip(found.T, noisy.T, strict=True):
-        inside = np.flatnonzero(column)
-        assert 0 < len(inside) < library.shape[1]
-        expected = np.linalg.lstsq(library[:, inside], target, rcond=None)[0]
-        np.testing.assert_allclose(column[inside], expected, rtol=1e-6)
 
 
 LEAST = ("knots_per_sample", "collocation_per_knot", "pretraining", "epochs", "learning_rate")

@@ -41,7 +41,7 @@ def test_all_frames_together_tell_how_a_camera_trembles_before_a_sky(tmp_path):
     assert motion.errors[0] == 0
 
 
-@pytest.mark.parametrize("change", [{"size": 90}, {"person": True, "leaves": True}])
+@pytest.mark.parametrize("change", [{"size": 90}, {"leaves": True}])
 def test_nothing_else_is_taken_for_a_motion_of_the_camera(tmp_path, monkeypatch, change):
     path, *_ = film(tmp_path, 1, **change)
     assert by_the_plate(path) is None
@@ -210,14 +210,3 @@ def test_a_camera_held_before_a_plain_wall_is_doubted(tmp_path):
     write_phone(tmp_path / "clip.mp4", phone, 3)
     found = track(tmp_path / "clip.mp4")
     assert any("too plain to tell whether the camera moves" in doubt for doubt in found.warnings)
-
-
-def test_the_error_of_a_map_is_about_that_by_which_it_misses():
-    errors, misses = [], []
-    for seed in range(6):
-        move = similar(1.3, -0.8, 0.004)
-        found = align(sight(seed, noise=4), sight(seed, move, noise=4))
-        points = np.array([[u, v, 1.0] for u in (20, 160, 300) for v in (20, 120, 220)])
-        errors.append(found.error)
-        misses.append(np.mean(((points @ (found.map - move).T) ** 2).sum(axis=1)) / 2)
-    assert 0.5 < np.sqrt(np.mean(misses) / np.mean(np.square(errors))) < 2

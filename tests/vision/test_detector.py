@@ -13,7 +13,14 @@ from vidsindy_lite.__main__ import main
 from vidsindy_lite.vision import network
 from vidsindy_lite.vision.network import Network, anchors
 from vidsindy_lite.vision.rendering import BACKGROUNDS, SHAPES, Scene, render
-from vidsindy_lite.vision.tracking import LEAST, WEIGHTS, LearnedDetector, OnnxDetector, detections
+from vidsindy_lite.vision.tracking import (
+    LEAST,
+    WEIGHTS,
+    LearnedDetector,
+    OnnxDetector,
+    check_detector,
+    detections,
+)
 
 LOG = json.loads(WEIGHTS.with_suffix(".json").read_text())
 
@@ -109,6 +116,10 @@ def test_bad_onnx_files(tmp_path):
     batch = write_red_detector(tmp_path / "batch.onnx", (64, 64), batch="batch")
     with pytest.raises(ValueError, match=r"detector: .* fixed shape \(1, 3, height, width\)"):
         OnnxDetector(batch)
+    for name in ("none.onnx", tmp_path / "none.onnx", tmp_path / "NONE.ONNX"):
+        with pytest.raises(FileNotFoundError, match=rf"detector: no such file, got '{name}'"):
+            check_detector(name)
+    assert check_detector(write_red_detector(tmp_path / "red.onnx", (256, 256))) is None
     thin = OnnxDetector(write_red_detector(tmp_path / "thin.onnx", (64, 64), rows=4))
     with pytest.raises(FileNotFoundError, match="weights: no such file"):
         LearnedDetector(tmp_path / "none.pt")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.vision.background import Plate
-from vidsindy_lite.vision.refining import Lens, View, entire, fitting, hidden, scatter
+from vidsindy_lite.vision.refining import Lens, View, entire, fitting, hidden, joined, scatter
 
 GROUND = np.full((60, 80, 3), (60, 90, 120), np.uint8)
 
@@ -127,6 +127,65 @@ def test_views_of_another_size_than_those_around_them_do_not_fit():
     border = ALL.copy()
     border[4] = False
     assert np.flatnonzero(~fitting(FRAMES, WAY, areas, border)).tolist() == [4, 12, 23]
+
+
+FORTY = np.arange(40)
+WAVE = np.column_stack([3.0 * FORTY, 50 + 20 * np.sin(FORTY / 6)])
+
+
+def test_what_touches_other_things_must_be_where_the_motion_leads():
+    areas, inside, places = np.full(40, 900.0), np.full(40, True), WAVE.copy()
+    places[20] += [4, 3]
+    alone = np.full(40, True)
+    assert fitting(FORTY, places, areas, inside, alone).all()
+    alone[18:23] = False
+    good = fitting(FORTY, places, areas, inside, alone)
+    np.testing.assert_array_equal(np.flatnonzero(~good), [20])
+    assert fitting(FORTY, places, areas, inside, np.full(40, False)).all()  # nothing special
+    # At an end it is held against views of the target alone.
+    alone = FORTY > 2
+    for off, area in ((15, 900.0), (0, 1800.0)):
+        places = WAVE + np.where(alone[:, None], [12, 0], [0, off])
+        areas = np.where(alone, 900.0, area)
+        good = fitting(FORTY + 4 * alone, places, areas, inside, alone)
+        np.testing.assert_array_equal(good, alone)
+
+
+def test_views_of_the_target_and_something_like_it_in_one_are_left_out():
+    areas = np.linspace(100, 200, 60)
+    areas[20:40] *= 2.5  # one beside the other
+    areas[50:52] *= 0.4  # hidden in part
+    np.testing.assert_array_equal(np.flatnonzero(joined(areas)), np.arange(20, 40))
+    frames, inside = np.arange(60), np.full(60, True)
+    good = fitting(frames, np.column_stack([2.0 * frames, frames]), areas, inside)
+    np.testing.assert_array_equal(np.flatnonzero(~good), [*range(20, 40), 50, 51])
+    # Nothing tells which is the target, where they never part, or were one from the beginning.
+    assert not joined(areas[:40]).any()
+    assert not joined(areas[18:]).any()
+    # Half hidden just before, it meets somebody.
+    areas = np.full(40, 100.0)
+    areas[11:15], areas[15:25], areas[24] = [30, 40, 60, 80], 180, 210
+    np.testing.assert_array_equal(np.flatnonzero(joined(areas)), np.arange(15, 25))
+    # Between two posts, each of which hides it in two views, it is whole.
+    areas = np.full(40, 100.0)
+    areas[[10, 11, 30, 31]] = 30
+    assert not joined(areas).any()
+
+
+def test_of_a_fast_target_no_view_is_left_out_but_one_that_is_displaced():
+    turn, width = 60, 0.25  # round in 60 frames, by up to 37 pixels a frame in a few of them
+    frames, areas, inside = np.arange(2 * turn), np.full(2 * turn, 150.0), np.full(2 * turn, True)
+    angle = 2 * np.pi * frames / turn
+    up = 130 * np.exp((np.cos(angle) - 1) / width**2)
+    places = np.column_stack([160 + 100 * np.cos(angle), 200 - up])
+    assert fitting(frames, places, areas, inside).all()
+    kept = np.delete(frames, np.s_[55:58])  # beside a gap
+    assert fitting(kept, places[kept], areas[kept], inside[kept]).all()
+    for displaced in range(turn - 12, turn + 13, 4):
+        seen = places.copy()
+        seen[displaced] += [20, 15]
+        good = fitting(frames, seen, areas, inside)
+        np.testing.assert_array_equal(np.flatnonzero(~good), [displaced])
 
 
 @pytest.mark.parametrize("side", [10.0, 40.0])

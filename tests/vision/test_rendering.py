@@ -126,8 +126,9 @@ def test_noise_has_the_variance_asked_for():
 
 
 def test_a_seed_gives_the_same_frames_and_file_and_another_seed_others(tmp_path):
-    scene = Scene.random(7, image_size=SMALL, noise_variance=0.01)
-    assert scene == Scene.random(np.random.default_rng(7), image_size=SMALL, noise_variance=0.01)
+    fixed = {"image_size": SMALL, "noise_variance": 0.01}
+    scene = Scene.random(7, **fixed)
+    assert scene == Scene.random(np.random.default_rng(7), **fixed) != Scene.random(4, **fixed)
     track = [[40.0, 40.0], [50.0, 42.0]]
     first, again, other = (list(render(track, scene, seed)) for seed in (1, 1, 2))
     assert np.array_equal(first, again)
@@ -153,14 +154,11 @@ def test_render_rejects(track, message):
     for shapes in (np.eye(2), np.ones((3, 2, 2)), np.full((2, 2, 2), np.nan)):
         with pytest.raises(ValueError, match=r"shapes: must be finite, of shape \(2, 2, 2\), got"):
             render(np.zeros((2, 2)), Scene(), shapes=shapes)
-
-
-@pytest.mark.parametrize("seed", [-1, 1.5, None])
-def test_seeds_are_whole_numbers(tmp_path, seed):
-    with pytest.raises(ValueError, match="seed: must be an integer of at least 0, got"):
-        render_video(tmp_path / "clip.mkv", [[40, 40]], Scene(), seed=seed)
-    with pytest.raises(ValueError, match="rng: must be an integer of at least 0, got"):
-        Scene.random(seed)
+    for seed in (-1, 1.5, None):
+        with pytest.raises(ValueError, match="seed: must be an integer of at least 0, got"):
+            render_video("clip.mkv", [[40, 40]], Scene(), seed=seed)
+        with pytest.raises(ValueError, match="rng: must be an integer of at least 0, got"):
+            Scene.random(seed)
 
 
 @settings(max_examples=30)
@@ -195,44 +193,20 @@ def test_of_several_targets_the_later_ones_are_in_front():
 
 
 @pytest.mark.parametrize(
-    ("box", "brown"),
-    [((20, 10, 12, 40), True), ((20, 10, 40, 40), True), ((20, 10, 40, 39), False)],
-)
-def test_posts_are_brown_and_hedges_are_green(box, brown):
-    left, top, width, height = box
-    frame = next(render([[np.nan, np.nan]], Scene("plain", occluders=(box,), image_size=SMALL)))
-    red, green, blue = frame[top : top + height, left : left + width].reshape(-1, 3).mean(axis=0)
-    assert green > blue + 10
-    assert (red > green + 10) == brown
-    assert (red < green - 10) != brown
-    plain = next(render([[np.nan, np.nan]], Scene("plain", image_size=SMALL)))
-    changed = np.abs(frame.astype(int) - plain).max(axis=2) > 20
-    assert np.flatnonzero(changed.any(axis=0)).tolist() == [*range(left, left + width)]
-    assert np.flatnonzero(changed.any(axis=1)).tolist() == [*range(top, top + height)]
-
-
-@pytest.mark.parametrize(
     ("field", "value"),
     [
         ("background", "moon"),
         ("shape", "cube"),
         ("colour", "teal"),
         ("size", 2),
-        ("size", np.nan),
         ("turns", np.inf),
         ("tumbling", -1),
         ("size_variation", 0.9),
         ("noise_variance", -0.1),
         ("shape_seed", -1),
-        ("shape_seed", 1.5),
-        ("size", True),
         ("turns", "many"),
-        ("image_size", 512),
         ("image_size", (10, 10)),
-        ("image_size", (512,)),
         ("occluders", ((1, 2, 3),)),
-        ("occluders", ((500, 0, 50, 50),)),
-        ("occluders", ((0, 0, 3, 50),)),
         ("occluders", ((0, 1, 4, 512),)),
         ("occluders", ((-1, 0, 9, 9),)),
         ("trees", ((1, 2, 3),)),
@@ -244,21 +218,6 @@ def test_scene_rejects(field, value):
         Scene(**{field: value})
 
 
-def moments(points):
-    """Area and centroid of a polygon as a fan of triangles around its first corner."""
-    a, b = points[1:-1] - points[0], points[2:] - points[0]
-    areas = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
-    centroids = points[0] + (a + b) / 3
-    return areas.sum(), areas @ centroids / areas.sum()
-
-
-@given(st.sampled_from(SHAPES), st.floats(4, 100), st.integers(0, 1000))
-def test_outlines_have_the_area_of_their_disc_and_their_centroid_at_zero(shape, size, seed):
-    area, centroid = moments(Scene(shape=shape, size=size, shape_seed=seed).outline())
-    assert area == pytest.approx(np.pi * size**2 / 4)
-    np.testing.assert_allclose(centroid, 0, atol=1e-9 * size)
-
-
 def test_random_scenes_are_drawn_from_their_ranges():
     scenes = [Scene.random(seed) for seed in range(200)]
     assert {s.background for s in scenes} == set(BACKGROUNDS)
@@ -268,8 +227,6 @@ def test_random_scenes_are_drawn_from_their_ranges():
         values = np.array([getattr(s, name) for s in scenes])
         assert low <= values.min() < low + 0.04 * (high - low)
         assert high >= values.max() > high - 0.04 * (high - low)
-    assert Scene.random(3) == Scene.random(np.random.default_rng(3)) != Scene.random(4)
-    assert Scene.random(3, size=9, noise_variance=0.01).size == 9
     largest = Scene(size=100, size_variation=0.5, noise_variance=0.1, occluders=[[0, 0, 4, 512]])
     assert largest.occluders == ((0, 0, 4, 512),)
 

@@ -99,13 +99,6 @@ def test_every_kind_is_read(tmp_path, text):
     np.testing.assert_allclose(track.pixels, PIXELS)
 
 
-@pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig", "latin-1"])
-def test_encodings(tmp_path, encoding):
-    path = tmp_path / "a.csv"
-    path.write_bytes(("Bildé,u,v\n" + OURS.partition("\n")[2]).encode(encoding))
-    np.testing.assert_allclose(read_tracks(path)[0].pixels, PIXELS)
-
-
 @pytest.mark.parametrize(
     ("text", "name"),
     [
@@ -153,16 +146,10 @@ def test_tables_of_other_kinds_are_refused_by_name(tmp_path, suffix):
         read_tracks(tmp_path / f"a{suffix}")
 
 
-def test_times_are_kept(tmp_path):
-    (track,) = read(tmp_path, TIMES)
-    np.testing.assert_allclose(track.t, [0, 0.1, 0.2, 0.3], atol=1e-12)
+def test_times_are_kept_and_trackers_world_is_not_taken_for_pixels(tmp_path):
+    assert read(tmp_path, OURS)[0].t is None
     (track,) = read(tmp_path, TRACKER_6)
     np.testing.assert_allclose(track.t, [0, 0.033, 0.066, 0.099], atol=1e-12)
-    assert read(tmp_path, OURS)[0].t is None
-
-
-def test_trackers_world_is_not_taken_for_pixels(tmp_path):
-    (track,) = read(tmp_path, TRACKER_6)
     assert "export its columns pixelx and pixely" in track.warnings[0]
     assert read(tmp_path, TRACKER_5)[0].warnings == ()
     with pytest.raises(ValueError, match="got x and y of Tracker or Kinovea with another"):
@@ -202,22 +189,15 @@ def test_a_file_that_is_no_text_is_not_printed(tmp_path, content):
     (tmp_path / "a.avi").write_bytes(content)
     with pytest.raises(ValueError, match=r"got 'a\.avi', which is none$"):
         read_tracks(tmp_path / "a.avi")
-
-
-def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(FileNotFoundError, match="tracks: no such file"):
         read_tracks(tmp_path / "none.csv")
 
 
-def test_empty_rows_are_frames_without_a_target(tmp_path):
+def test_empty_rows_and_zeros_are_frames_without_a_target_and_these_are_said(tmp_path):
+    nan = [np.nan, np.nan]
     (track,) = read(tmp_path, "u\tv\n\t\n1\t2\n\t\n3\t4\n")
-    nan = [np.nan, np.nan]
     np.testing.assert_array_equal(track.pixels, [nan, [1, 2], nan, [3, 4]])
-
-
-def test_zeros_are_frames_without_a_target_and_said(tmp_path):
     (track,) = read(tmp_path, "u,v\n1,2\n0,0\n0,5\n0.0,0\n")
-    nan = [np.nan, np.nan]
     np.testing.assert_array_equal(track.pixels, [[1, 2], nan, [0, 5], nan])
     assert track.warnings == ("a.csv: 0, 0 in 2 of 4 rows is taken for not seen",)
     assert read(tmp_path, "u,v\n1,2\n0,5\n")[0].warnings == ()

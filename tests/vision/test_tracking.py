@@ -9,7 +9,7 @@ from tiny_onnx import write_red_detector
 from vidsindy_lite import Hint
 from vidsindy_lite.vision import track_targets
 from vidsindy_lite.vision.rendering import Scene, render_restless, render_video
-from vidsindy_lite.vision.tracking import LEAST, Detection, check_detector, link, track
+from vidsindy_lite.vision.tracking import LEAST, Detection, link, track
 from vidsindy_lite.vision.video import write_video
 
 SIZE = (256, 192)
@@ -34,13 +34,18 @@ def distance_to_rectangle(points, rectangle):
     return np.linalg.norm(points - np.clip(points, low, low + [width, height]), axis=1)
 
 
-@pytest.mark.parametrize("background", ["plain", "hills", "wood"])
-def test_clean_textured_video(tmp_path, background):
-    truth = winding_path(100)
-    scene = Scene(background, size=18, image_size=SIZE)
-    error = errors(render_video(tmp_path / "clip.mov", truth, scene, seed=1), truth)
+@pytest.mark.parametrize("background", ["plain", "wood", "sky", "bricks"])
+def test_an_ordinary_video_raises_no_doubt(tmp_path, background):
+    clean, truth = background in ("plain", "wood"), winding_path(60)
+    scene = Scene(background, size=18, noise_variance=0 if clean else 0.01, image_size=SIZE)
+    path = render_video(tmp_path / "clip.mov", truth, scene, seed=1)
+    found = track(path)
+    error = np.linalg.norm(found.pixels - truth, axis=1)
     assert np.isfinite(error).all()
-    assert np.sqrt(np.mean(error**2)) < 0.02
+    assert np.sqrt(np.mean(error**2)) < (0.02 if clean else 0.2)
+    assert found.detector == "background"
+    assert found.warnings == ()
+    np.testing.assert_array_equal(found.pixels, track(path, "background").pixels)
 
 
 @pytest.mark.parametrize(
@@ -104,12 +109,6 @@ def circle(radius, n=150):
     return [120, 90] + radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def test_a_target_that_stands_still_is_background(tmp_path):
-    scene = Scene("sea", size=18, image_size=SIZE)
-    path = render_video(tmp_path / "clip.mov", circle(0, 60), scene, seed=2)
-    assert np.isnan(track(path).pixels).all()
-
-
 def test_a_target_that_hardly_leaves_its_place_is_followed_at_its_middle(tmp_path):
     truth, size = circle(2, 60), 18
     scene = Scene("sea", size=size, image_size=SIZE)
@@ -127,6 +126,9 @@ def test_nothing_is_invented_in_an_empty_scene(tmp_path):
     found = track(path).pixels
     assert found.shape == (40, 2)
     assert np.isnan(found).all()
+    scene = Scene("sea", size=18, image_size=SIZE)  # what stands still is background
+    path = render_video(tmp_path / "clip.mov", circle(0, 60), scene, seed=2)
+    assert np.isnan(track(path).pixels).all()
 
 
 def test_a_single_frame_shows_no_motion(tmp_path):
@@ -163,16 +165,6 @@ def test_auto_takes_out_the_motion_of_the_camera_and_of_the_light(
     assert any("the background is not at rest" in w for w in classical.warnings)
     error = np.linalg.norm(found.in_frames - truth, axis=1)
     assert np.mean(np.linalg.norm(classical.pixels - truth, axis=1) < 1) <= np.mean(error < 1)
-
-
-@pytest.mark.parametrize("background", ["sky", "sea", "bricks"])
-def test_an_ordinary_video_raises_no_doubt(tmp_path, background):
-    scene = Scene(background, size=30, noise_variance=0.01, image_size=SIZE)
-    path = render_video(tmp_path / "clip.mov", winding_path(40), scene)
-    found = track(path)
-    assert found.detector == "background"
-    assert found.warnings == ()
-    np.testing.assert_array_equal(found.pixels, track(path, "background").pixels)
 
 
 def test_a_camera_that_trembles_is_told(tmp_path):
@@ -214,13 +206,6 @@ def test_any_onnx_model_tracks(tmp_path):
 def test_unknown_detectors(tmp_path, detector):
     with pytest.raises(ValueError, match="detector: must be one of auto, background, learned, or"):
         track(tmp_path / "clip.mov", detector)
-
-
-def test_a_missing_detector_is_told_at_once(tmp_path):
-    for name in ("none.onnx", tmp_path / "none.onnx", tmp_path / "NONE.ONNX"):
-        with pytest.raises(FileNotFoundError, match=rf"detector: no such file, got '{name}'"):
-            check_detector(name)
-    assert check_detector(write_red_detector(tmp_path / "red.onnx", (256, 256))) is None
 
 
 def seen(u, confidence=0.9):
