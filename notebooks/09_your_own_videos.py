@@ -578,8 +578,8 @@ assert not full or seen["Lorenz"].driven == "1 moves independently; 1 drives 2 b
 paths, tracks_of_both = sorted(Path(home.name).glob("springs_*.mov")), seen["springs"].tracks
 images = [read_frame(path, 0) for path in paths]
 titles = ["camera 1", "camera 2", "camera 3"]
-fig = plots.plot_frames(images, titles, [cameras.stacked(track, 2) for track in tracks_of_both])
-caption = "Two targets that look the same, and their tracks in three views."
+fig = plots.plot_frames(images, titles, tracks_of_both)
+caption = "Two targets that look the same, and the track of each in three views."
 lost = [float(np.isnan(track).any(axis=1).mean()) for track in tracks_of_both]
 save_figure("own_both", fig, caption=caption, numbers={"share of frames where they meet": lost})
 assert max(lost) > 0

@@ -46,6 +46,15 @@ def test_frames_of_different_sizes_keep_their_own_axes():
     assert [len(axes.child_axes) for axes in figure.axes[:2]] == [0, 1]
 
 
+def test_each_of_several_targets_has_its_own_colour_and_name():
+    track = np.arange(12.0).reshape(3, 4)
+    figure = plots.plot_frames([np.zeros((60, 80, 3), np.uint8)], ["a"], [track])
+    first, second = figure.axes[0].lines
+    np.testing.assert_array_equal(second.get_xydata(), track[:, 2:])
+    assert first.get_color() != second.get_color()
+    assert [text.get_text() for text in figure.legends[0].texts] == ["target 1", "target 2"]
+
+
 def test_what_is_missing_is_shaded_over_time():
     t = np.linspace(0, 1, 30)
     x = np.column_stack((t, t**2, t**3))

@@ -430,7 +430,7 @@ def _look(
 ) -> Figure:
     """A frame of each view, with its whole track over it."""
     titles = [f"{_short(name, i)}, frame {frames[i]}" for i, name in enumerate(names)]
-    return plot_frames(images, titles, [stacked(track, 2) for track in tracks], index)
+    return plot_frames(images, titles, tracks, index)
 
 
 def _short(name: str, i: int) -> str:

@@ -191,14 +191,15 @@ def plot_frames(
     images : sequence of ndarray, shape (height, width, 3), uint8
         As a video reader gives them; sizes may differ.
     titles : sequence of str
-    tracks : sequence of ndarray, shape (n, 2)
-        Pixels of the target in all frames of each video.
+    tracks : sequence of ndarray, shape (n, 2 k)
+        Pixels of k targets in all frames of each video, each target in its own colour.
     index : int or sequence of int
-        Where on the tracks the images were taken: the target is magnified if it is seen there.
+        Where on the tracks the images were taken: the first target is magnified if seen there.
     """
     columns = min(len(images), 3)
     rows = -(-len(images) // columns)
-    size = (2.7 * columns + 0.6, 3.0 * rows + 0.5)
+    several = tracks[0].shape[1] > 2
+    size = (2.7 * columns + 0.6, 3.0 * rows + 0.5 + 0.25 * several)
     alike = len({image.shape for image in images}) == 1
     shared = {"sharex": alike, "sharey": alike, "squeeze": False}
     figure, grid = plt.subplots(rows, columns, figsize=size, layout="compressed", **shared)
@@ -213,13 +214,18 @@ def plot_frames(
         axes.set(xlim=(-0.5, width - 0.5), xlabel="u (px)")
         axes.set(ylim=(height - 0.5, -0.5), ylabel="v (px)")
         axes.locator_params(nbins=3)
-        axes.plot(*track.T, color="C0", lw=1.0, path_effects=halo)
-        if np.isfinite(track[k]).all():
-            _magnify(axes, image, track, k)
+        targets = np.split(track, track.shape[1] // 2, axis=1)
+        for j, target in enumerate(targets):
+            style = {"color": f"C{j}", "label": f"target {j + 1}"}
+            axes.plot(*target.T, lw=1.0, path_effects=halo, **style)
+        if np.isfinite(targets[0][k]).all():
+            _magnify(axes, image, np.concatenate(targets), k)
         if alike:
             axes.label_outer()
     for axes in grid.flat[len(images) :]:
         axes.remove()
+    if several:
+        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=9)
     return figure
 
 
