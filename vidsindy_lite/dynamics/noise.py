@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import cho_solve_banded, toeplitz
+from scipy.special import ndtr
 
 from ..arrays import Bools, Floats
 from .bspline import Segment
@@ -278,8 +279,7 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     # What is known of a law (the slope of a position is the velocity) holds exactly.
     physics = np.where(free, 1.0, FINAL_WEIGHT) * start.physics_weights
     kicked = _balanced(problem, start.weighted(start.data_weights, physics), every, rng)
-    # Standard errors: at 4 three times as many drives pass, and at 3 all kicks still do.
-    if unlike_kicks(kicked, free, rng) > 3:
+    if like_kicks(kicked, free, rng) < 0.01:
         return None
     exact = _measured_badly(problem, fit, segments)
     newcomers = int((every.active & ~fit.state.active).sum())  # each of them gains 1 by chance
@@ -385,12 +385,12 @@ def _measurements_used(collocation: Collocation, probes: Floats, solved: Floats)
     return ((before * after).mean(axis=2) * collocation.sample_weights).sum(axis=0)
 
 
-def unlike_kicks(fit: Fit, free: Bools, rng: np.random.Generator) -> float:
-    """How far what the law misses is from what independent kicks and errors would leave.
+def like_kicks(fit: Fit, free: Bools, rng: np.random.Generator) -> float:
+    """How probable it is that independent kicks and errors leave what the law misses, at most.
 
     Both are simulated and smoothed as the data were; their spectra are compared by octaves: the
     largest distance between the logarithms of a band, in standard errors, over the equations that
-    are ``free`` to be kicked.
+    are ``free`` to be kicked. Of so many bands any one may be as far off (Bonferroni).
     """
     collocation, grid, d = fit.collocation, fit.collocation.grid, fit.collocation.d
     factor, physics = collocation.factor(fit.state)
@@ -404,9 +404,10 @@ def unlike_kicks(fit: Fit, free: Bools, rng: np.random.Generator) -> float:
     found = _bands((root * collocation.physics_residual(fit.state))[:, :, None])
     expected = _bands(simulated.reshape(-1, d, PROBES))
     count = OCTAVE * 2.0 ** np.maximum(np.arange(len(found)) - 1, 0)
-    distance = np.abs(np.log(np.maximum(found, LEAST) / np.maximum(expected, LEAST)))
+    distance = np.abs(np.log(np.maximum(found, LEAST) / np.maximum(expected, LEAST)))[:, free]
     # Splines by themselves blur the logarithm of a band by .15.
-    return float((distance / np.sqrt(1 / count + 0.15**2)[:, None])[:, free].max())
+    errors = distance / np.sqrt(1 / count + 0.15**2)[:, None]
+    return float(2 * ndtr(-errors.max()) * errors.size)
 
 
 def _bands(signal: Floats) -> Floats:
