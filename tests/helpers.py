@@ -160,6 +160,29 @@ def room(rng, cameras=3, **lens):
     return vl.Rig(views)
 
 
+def shot(rng, rig, frames, late=(0.0,) * 5, noise=0.5, path=walk):
+    """Noisy tracks, each so many frames late; rolling shutters look at each row as it is read."""
+    tracks = []
+    for camera, lag in zip(rig.cameras, late, strict=False):
+        height, seen = camera.image_size[1], camera.project(path(frames + lag))
+        for _ in range(15 if camera.readout else 0):
+            shift = camera.readout * (seen[:, 1] - (height - 1) / 2) / height
+            seen = camera.project(path(frames + lag + shift))
+        tracks.append(seen + noise * rng.normal(size=seen.shape))
+    return tracks
+
+
+def far_off(rig):
+    """The cameras of a room as they would be far away, seeing alike what is in its middle."""
+    return [
+        vl.OrthographicCamera(
+            position=np.zeros(3), normal=c.normal, angle=c.angle, image_size=c.image_size,
+            scale=c.scale * (c.normal @ c.position),
+        )
+        for c in rig.cameras
+    ]  # fmt: skip
+
+
 def by_hand(rng, rig, **more):
     """The rig as a hand measures it: 2 degrees, 3 cm, 3 %."""
     return vl.Rig(

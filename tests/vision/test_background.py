@@ -6,34 +6,14 @@ import pytest
 
 from vidsindy_lite.vision.background import (
     BackgroundModel,
-    Blob,
     Plate,
     least_difference,
     lights_of,
     noise_of,
     tolerance,
-    view_distances,
 )
 
 SIZE = (128, 96)
-
-
-def blob(shape=(0, 0, 0, 0), area=400.0, inside=True, sound=True):
-    return Blob(np.zeros(2), area, inside, np.array(shape, float) if sound else None)
-
-
-def test_distances_of_views_from_the_commonest_one():
-    # At an area of 400 pixels, shapes 0.6 / 20 = 0.03 apart are just alike.
-    odd = [blob((0.06, 0, 0, 0)), blob((0, 0.3, 0, 0)), blob(area=800), None]
-    unseen = [blob(inside=False), blob(sound=False)]
-    distance = view_distances([*[blob()] * 20, *odd, *unseen])
-    np.testing.assert_allclose(distance[:20], 0)
-    np.testing.assert_allclose(distance[20:22], [2, 10])
-    assert distance[22] == pytest.approx(np.log(2) * np.sqrt(800) / 0.6)
-    assert np.isinf(distance[23:]).all()
-    assert np.isinf(view_distances([None, None])).all()
-    many = view_distances([*[blob()] * 250, blob((0, 0.3, 0, 0))])
-    np.testing.assert_allclose(many, [*[0] * 250, 10])
 
 
 def learned(samples):

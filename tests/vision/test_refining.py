@@ -1,11 +1,10 @@
 """Views of the target: where it is, and which are whole."""
 
-import cv2
 import numpy as np
 import pytest
 
 from vidsindy_lite.vision.background import Plate
-from vidsindy_lite.vision.refining import Lens, View, entire, fitting, hidden, joined, scatter
+from vidsindy_lite.vision.refining import Lens, View, entire, fitting, joined, scatter
 
 GROUND = np.full((60, 80, 3), (60, 90, 120), np.uint8)
 
@@ -235,35 +234,3 @@ def test_what_turns_about_a_whole_that_keeps_its_size_is_a_part_of_it():
     kept, doubts = entire(shown := parts_of_wholes(around, changing))
     assert kept == shown
     assert "several colours" in doubts[0]
-
-
-def view(centre, sides, post):
-    """Outline, middle and area of what is seen of an ellipse on one side of a post."""
-    picture = np.zeros((200, 260), np.uint8)
-    ends = [np.rint(16 * np.array(x)).astype(int).tolist() for x in (centre, np.array(sides) / 2)]
-    cv2.ellipse(picture, *ends, 0, 0, 360, 1, -1, cv2.LINE_8, 4)
-    picture[:, slice(*post)] = 0
-    count, labels, stats, centres = cv2.connectedComponentsWithStats(picture)
-    part = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
-    outline = cv2.convexHull(np.argwhere(labels == part)[:, ::-1].astype(np.int32))[:, 0]
-    return outline.astype(float), centres[part], float(stats[part, cv2.CC_STAT_AREA])
-
-
-def passing(sides, post=(0, 0)):
-    """Views of what passes a post several times: outlines, middles, areas, and how far off."""
-    t = np.linspace(0, 2 * np.pi, 80)
-    places = np.column_stack([120 - 80 * np.cos(t), 100 + 25 * np.sin(1.7 * t)])
-    outlines, *rest = zip(*(view(place, sides, post) for place in places), strict=True)
-    centres, areas = map(np.array, rest)
-    return outlines, centres, areas, np.linalg.norm(centres - places, axis=1)
-
-
-@pytest.mark.parametrize("diameter", [24, 60])
-def test_views_that_are_cut_by_a_post_are_of_parts(diameter):
-    *seen, off = passing((diameter, diameter), post=(90, 110))
-    *whole, _ = passing((diameter, diameter // 2))
-    assert not hidden(*whole).any()
-    found, cut = hidden(*seen), off > 0.02 * diameter + 0.5
-    assert cut.sum() >= 6
-    assert found[cut].all()
-    assert found[~cut].mean() < 0.15  # those that just touch it
