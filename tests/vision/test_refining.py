@@ -83,18 +83,6 @@ def test_the_whole_of_a_thing_of_two_colours_has_the_area_and_centroid_of_both()
     np.testing.assert_allclose(view.whole.centroid, (39.5, 27), atol=0.05)
 
 
-@pytest.mark.parametrize(
-    ("contrast", "off", "same"),
-    # Off the line from ground to target by 0.45 of its length, or by 16 grey levels.
-    [(130, 45, True), (130, 75, False), (25, 12, True), (25, 25, False)],
-)
-def test_what_is_far_off_the_line_from_ground_to_target_has_another_colour(contrast, off, same):
-    red, green = np.array([0, 0, contrast]), np.array([0, off, 0])
-    box = (28, 18, 26, 26)  # of which its blurred rim is a part that is no test
-    area = look(painted((box, GROUND[0, 0] + red + green)), box, GROUND[0, 0] + red).area
-    assert area > 0.9 * 26**2 if same else area < 0.7 * 26**2
-
-
 def test_what_differs_from_the_ground_the_other_way_round_is_another_colour():
     ground, box = GROUND[0, 0].astype(int), (30, 20, 20, 15)
     for width, both in ((10, 300), (18, 270)):  # a tenth of another colour is no part of it
@@ -185,17 +173,6 @@ def test_of_a_fast_target_no_view_is_left_out_but_one_that_is_displaced():
         seen[displaced] += [20, 15]
         good = fitting(frames, seen, areas, inside)
         np.testing.assert_array_equal(np.flatnonzero(~good), [displaced])
-
-
-@pytest.mark.parametrize("side", [10.0, 40.0])
-def test_a_view_may_be_off_its_way_by_a_part_of_its_size(side):
-    # A pixel, and three tenths of the side of the target.
-    areas = np.full(30, side**2)
-    for off, fits in ((0.7 * (1 + 0.3 * side), True), (1.4 * (1 + 0.3 * side), False)):
-        places = WAY.copy()
-        places[15, 1] += off
-        assert fitting(FRAMES, places, areas, ALL)[15] == fits
-        assert fitting(FRAMES, places, areas, ALL).sum() == 29 + fits
 
 
 def test_the_scatter_is_that_of_the_noise_whatever_cubic_the_motion_is():
