@@ -84,32 +84,34 @@ def dependent(rng, n, memory):
     return series
 
 
-def random_rig(rng, x, cameras=3):
-    """Cameras anywhere around x, facing so differently that no axis is poorly seen."""
-    low, high = x.min(axis=0), x.max(axis=0)
-    reach = np.linalg.norm(high - low) / 2
-    while True:
-        normals = rng.normal(size=(cameras, 3))
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        if np.linalg.eigvalsh(cameras * np.eye(3) - normals.T @ normals)[0] > cameras / 3:
-            break
-    return vl.Rig(
-        vl.OrthographicCamera(
-            position=(low + high) / 2 + reach * (rng.uniform(-2, 2) * n + 0.1 * rng.normal(size=3)),
-            normal=n,
-            scale=reach / rng.uniform(180, 230),
-            angle=rng.uniform(-np.pi, np.pi),
-        )
-        for n in normals
-    )
+def scene(seed, n=500, cameras=3, kinds=(vl.OrthographicCamera,)):
+    """A random path, cameras of some kinds around it, their exact tracks, and the generator.
 
-
-def scene(seed, n=500, cameras=3):
-    """A random path, orthographic cameras around it, their exact tracks, and the generator."""
+    They look roughly at it, so differently that no axis is poorly seen, from 1.5 to 6 times its
+    reach.
+    """
     rng = np.random.default_rng(seed)
     x = trajectory(rng, n)
-    rig = random_rig(rng, x, cameras)
-    return x, rig, [camera.project(x) for camera in rig.cameras], rng
+    reach = np.linalg.norm(np.ptp(x, axis=0)) / 2
+    while True:
+        out = rng.normal(size=(cameras, 3))
+        out /= np.linalg.norm(out, axis=1, keepdims=True)
+        if np.linalg.eigvalsh(cameras * np.eye(3) - out.T @ out)[0] > cameras / 3:
+            break
+    views = []
+    for direction in out:
+        kind = kinds[rng.integers(len(kinds))]
+        distance = rng.uniform(1.5, 6) * reach
+        pixel = reach / rng.uniform(150, 230)
+        views.append(
+            kind(
+                position=(x.min(0) + x.max(0)) / 2 + distance * direction,
+                normal=direction + 0.1 * rng.normal(size=3),
+                scale=pixel if kind is vl.OrthographicCamera else pixel / distance,
+                angle=rng.uniform(-np.pi, np.pi),
+            )
+        )
+    return x, vl.Rig(views), [camera.project(x) for camera in views], rng
 
 
 def solved(t, x, degree):
@@ -158,6 +160,29 @@ def room(rng, cameras=3, **lens):
             )
         )
     return vl.Rig(views)
+
+
+def shot(rng, rig, frames, late=(0.0,) * 5, noise=0.5, path=walk):
+    """Noisy tracks, each so many frames late; rolling shutters look at each row as it is read."""
+    tracks = []
+    for camera, lag in zip(rig.cameras, late, strict=False):
+        height, seen = camera.image_size[1], camera.project(path(frames + lag))
+        for _ in range(15 if camera.readout else 0):
+            shift = camera.readout * (seen[:, 1] - (height - 1) / 2) / height
+            seen = camera.project(path(frames + lag + shift))
+        tracks.append(seen + noise * rng.normal(size=seen.shape))
+    return tracks
+
+
+def far_off(rig):
+    """The cameras of a room as they would be far away, seeing alike what is in its middle."""
+    return [
+        vl.OrthographicCamera(
+            position=np.zeros(3), normal=c.normal, angle=c.angle, image_size=c.image_size,
+            scale=c.scale * (c.normal @ c.position),
+        )
+        for c in rig.cameras
+    ]  # fmt: skip
 
 
 def by_hand(rng, rig, **more):

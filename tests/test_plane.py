@@ -7,7 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from helpers import real
-from phones import write_at
 from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
@@ -15,7 +14,6 @@ from vidsindy_lite import plane
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.dynamics import homogeneous
 from vidsindy_lite.vision import Track
-from vidsindy_lite.vision.rendering import render
 
 SCALE = 250.0  # pixels in a metre
 STICK = (100.0, 600.0, 100.0, 600.0 - SCALE / 2, 0.5)
@@ -259,23 +257,6 @@ def test_what_does_not_go_together_is_refused(tmp_path, monkeypatch, capsys, giv
     assert main(["rig-template", "--output", "rig.toml"]) == 0
     assert main(["discover", "a.mov", *given]) == 2
     assert message in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_a_film_of_a_throw(tmp_path):
-    """H.264, as telephones write it, by a camera that is rolled."""
-    t, (c, s) = np.arange(18) / 30, (np.cos(0.04), np.sin(0.04))
-    places = np.column_stack([0.8 * (t - 0.3), -0.3 + 2.8 * t - 9.81 * t**2 / 2])
-    rolled = 256 * np.array([[c, s], [s, -c]])
-    scene = vl.Scene("wood", size=16, image_size=(480, 640), noise_variance=0.0005)
-    frames = render((240, 320) + places @ rolled, scene, 0)
-    path = write_at(tmp_path / "film.mp4", t, frames, "libx264", "yuv420p", crf="24")
-    marks = (240, 320) + np.array([[-0.3, -0.2], [-0.3, 0.3]]) @ rolled
-    found = vl.discover_from_video(path, (*marks.ravel(), 0.5))
-    direction = found.discovery.physics()["direction"].value
-    assert found.status == "ok"
-    assert abs(found.g.value - 9.81) < 2 * found.g.error < 0.5
-    assert np.arctan2(direction[0], -direction[1]) == pytest.approx(-0.04, abs=0.005)
 
 
 # --------------------------------------------------------------------------------------- real clips

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import by_hand, dependent, room, walk
+from helpers import by_hand, dependent, far_off, room, shot, walk
 from scipy.interpolate import make_interp_spline
 
 import vidsindy_lite as vl
@@ -16,25 +16,12 @@ NAMES = ["a.mp4", "b.mp4", "c.mp4", "d.mp4"]
 FRAMES = np.arange(500)
 
 
-def seen(rng, rig, noise=0.5, late=0.0):
-    """Tracks, those of the last camera so many frames late."""
-    tracks = []
-    for i, camera in enumerate(rig.cameras):
-        height, extra = camera.image_size[1], late if i == len(rig.cameras) - 1 else 0.0
-        track = camera.project(walk(FRAMES + extra))
-        for _ in range(10):
-            shift = extra + camera.readout * (track[:, 1] - (height - 1) / 2) / height
-            track = camera.project(walk(FRAMES + shift))
-        tracks.append(track + noise * rng.normal(size=track.shape))
-    return tracks
-
-
 def flawed(rng, what):
     """Tracks, and a rig of four cameras with one thing wrong, of the last camera or of all."""
     wide = {"distortion": {"distortion": (-0.15,)}, "readout": {"readout": 0.4}}
     rig = room(rng, 4, **wide.get(what, {}))
     late = {"lag": 0.3, "drift": 0.8 * np.linspace(-0.5, 0.5, len(FRAMES))}
-    tracks = seen(rng, rig, late=late.get(what, 0.0))
+    tracks = shot(rng, rig, FRAMES, (0, 0, 0, late.get(what, 0.0)))
     *others, last = (replace(c, distortion=None, readout=0.0) for c in rig.cameras)
     change = {
         "normal": {"normal": last.normal + 0.02 * last.rows[0]},
@@ -42,17 +29,11 @@ def flawed(rng, what):
         "scale": {"scale": 1.03 * last.scale},
     }
     if what == "nearness":
-        flat = [
-            vl.OrthographicCamera(
-                position=np.zeros(3), normal=c.normal, angle=c.angle, image_size=c.image_size,
-                scale=c.scale * (c.normal @ c.position),
-            )
-            for c in (*others, last)
-        ]  # fmt: skip
         aimed = [replace(c, normal=c.position) for c in rig.cameras]
-        tracks = seen(rng, vl.Rig(aimed))
-        flat = [replace(f, normal=c.normal) for f, c in zip(flat, aimed, strict=True)]
-        return tracks, vl.Rig(flat)
+        flat = zip(far_off(rig), aimed, strict=True)
+        return shot(rng, vl.Rig(aimed), FRAMES), vl.Rig(
+            replace(f, normal=c.normal) for f, c in flat
+        )
     return tracks, vl.Rig((*others, replace(last, **change.get(what, {}))))
 
 
@@ -83,7 +64,7 @@ def test_one_camera_is_blamed_where_all_would_explain_as_much(part):
     rng = np.random.default_rng([1, 7])
     rig = room(rng, 4)
     *others, last = rig.cameras
-    tracks = seen(rng, vl.Rig((*others, replace(last, **part))))
+    tracks = shot(rng, vl.Rig((*others, replace(last, **part))), FRAMES)
     cause = explain(tracks, rig, learn_cameras(tracks, rig))
     assert (cause.what, cause.cameras) == (*part, (3,))
 
@@ -102,7 +83,7 @@ def test_a_good_rig_and_poor_tracks_are_no_reason_to_doubt(rho, learned):
 def test_what_was_measured_with_an_error_is_not_blamed():
     rng = np.random.default_rng(13)
     rig = room(rng, 4)
-    tracks = seen(rng, rig)
+    tracks = shot(rng, rig, FRAMES)
     measured = by_hand(rng, rig)
     assert explain(tracks, measured, learn_cameras(tracks, measured)) is None
     exact = vl.Rig(

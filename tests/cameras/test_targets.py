@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import vidsindy_lite as vl
-from vidsindy_lite.cameras import identify, side_by_side, stacked
+from vidsindy_lite.cameras import identify
 
 FRAMES = 240
 BLIND = 7  # frames around a meeting in which a view loses the targets
@@ -146,12 +146,3 @@ def test_views_that_never_show_all_targets_at_once_or_other_things_are_refused()
     ]
     with pytest.raises(ValueError, match="targets: one order of the targets"):
         identify(tracks, rig)
-
-
-@settings(max_examples=20)
-@given(st.integers(1, 9), st.integers(1, 3), st.integers(1, 4))
-def test_side_by_side_is_the_inverse_of_stacked(n, width, count):
-    values = np.random.default_rng(n).normal(size=(n, width * count))
-    rows = stacked(values, width)
-    assert rows.shape == (n * count + count - 1, width)
-    np.testing.assert_array_equal(side_by_side(rows, count), values)

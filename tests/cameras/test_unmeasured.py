@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import aligned_error, room, walk
+from helpers import aligned_error, far_off, room, shot, walk
 
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import AffineCamera, factorised, learn_cameras_eq4, posed
 from vidsindy_lite.pipeline import observe_tracks
 
-FRAMES = 240
+FRAMES = np.arange(240)
 
 
 def lenses(rng, rig, off=0.05, **more):
@@ -27,17 +27,10 @@ def lenses(rng, rig, off=0.05, **more):
     )  # fmt: skip
 
 
-def filmed(rng, rig, late=(0.0,) * 5, noise=0.5):
-    tracks = [
-        c.project(walk(np.arange(FRAMES) + lag)) for c, lag in zip(rig.cameras, late, strict=False)
-    ]
-    return [track + noise * rng.normal(size=track.shape) for track in tracks]
-
-
 def test_the_frame_is_that_of_the_first_camera_and_is_told():
     rng = np.random.default_rng(1)
     rig = room(rng)
-    tracks = filmed(rng, rig)
+    tracks = shot(rng, rig, FRAMES)
     learned = posed(tracks, lenses(rng, rig))
     first, second, _ = learned.cameras
     np.testing.assert_allclose(first.normal, [0, 0, 1], atol=1e-12)
@@ -57,11 +50,11 @@ def test_the_frame_is_that_of_the_first_camera_and_is_told():
 def test_a_known_distance_gives_the_unit_of_length():
     rng = np.random.default_rng(2)
     rig = room(rng)
-    tracks = filmed(rng, rig)
+    tracks = shot(rng, rig, FRAMES)
     first, second, _ = (c.position for c in rig.cameras)
     distance = float(np.linalg.norm(first - second))
-    seen = observe_tracks(tracks, lenses(rng, rig, distance=distance), np.arange(FRAMES) / 30)
-    spread = [np.sqrt(np.mean(np.var(x, axis=0))) for x in (seen.x, walk(np.arange(FRAMES)))]
+    seen = observe_tracks(tracks, lenses(rng, rig, distance=distance), FRAMES / 30)
+    spread = [np.sqrt(np.mean(np.var(x, axis=0))) for x in (seen.x, walk(FRAMES))]
     assert abs(spread[0] / spread[1] - 1) < 0.01
     assert seen.warnings == ()
     assert "the first camera is" in seen.rig.note
@@ -70,10 +63,10 @@ def test_a_known_distance_gives_the_unit_of_length():
 def test_small_lags_are_learned_beside():
     rng = np.random.default_rng(3)
     rig, late = room(rng, 4), (0, 0.7, -0.9, 0.3)
-    tracks = filmed(rng, rig, late)
-    seen = observe_tracks(tracks, lenses(rng, rig), np.arange(FRAMES) / 30)
+    tracks = shot(rng, rig, FRAMES, late)
+    seen = observe_tracks(tracks, lenses(rng, rig), FRAMES / 30)
     np.testing.assert_allclose(seen.lags.frames, late, atol=0.1)
-    x = walk(np.arange(FRAMES))
+    x = walk(FRAMES)
     inside = np.isfinite(seen.x).all(axis=1)
     assert aligned_error(seen.x[inside], x[inside]) < 0.005 * np.ptp(x, axis=0).max()
 
@@ -97,7 +90,7 @@ def blind(rig, known=0):
 def test_nothing_is_known_at_all(times, known):
     rng = np.random.default_rng([5, times])
     rig = of_lenses(room(rng), times)
-    x, tracks = walk(np.arange(FRAMES)), filmed(rng, rig)
+    x, tracks = walk(FRAMES), shot(rng, rig, FRAMES)
     learned = vl.learn_cameras(tracks, blind(rig, known))
     assert aligned_error(vl.reconstruct(tracks, learned), x) < 0.005 * np.ptp(x, axis=0).max()
     assert "focal lengths are those that the tracks tell" in learned.note
@@ -108,14 +101,8 @@ def test_nothing_is_known_at_all(times, known):
 
 def test_from_infinity_either_hand_fits():
     rng = np.random.default_rng(6)
-    rig = vl.Rig(
-        vl.OrthographicCamera(
-            position=np.zeros(3), normal=c.normal, angle=c.angle, image_size=c.image_size,
-            scale=c.scale * (c.normal @ c.position),
-        )
-        for c in room(rng).cameras
-    )  # fmt: skip
-    x, tracks = walk(np.arange(FRAMES)), filmed(rng, rig)
+    rig = vl.Rig(far_off(room(rng)))
+    x, tracks = walk(FRAMES), shot(rng, rig, FRAMES)
     learned = vl.learn_cameras(tracks, blind(rig))
     assert any("true one or its mirror image" in text for text in learned.warnings)
     found, size = vl.reconstruct(tracks, learned), np.ptp(x, axis=0).max()

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers import noisy
 
 import vidsindy_lite as vl
 from vidsindy_lite import Library, PolynomialSystem
@@ -15,24 +16,16 @@ def drag(v, u):
     return np.hypot(v, u) * v
 
 
-def swing(friction=0.1, amplitude=1.5, noise=0.01, seed=0, n=700):
-    """A pendulum of 1 m, its law, times and noisy angles."""
-    terms = {"x": {"vx": 1.0}, "vx": {"sin(x)": -9.81, "vx": -friction}}
-    law = PolynomialSystem.from_terms(terms, library=PENDULUM)
-    t = np.linspace(0, 20, n)
-    x = law.simulate(t, [amplitude, 0.0])[:, :1]
-    return law, t, x + noise * x.std() * np.random.default_rng(seed).normal(size=x.shape)
-
-
 @pytest.mark.parametrize(
     ("friction", "library"), [(0.1, PENDULUM), (0.0, Library.polynomial(3) + Library.fourier(1))]
 )
 def test_a_pendulum_at_a_large_amplitude_is_found_from_its_angle_alone(friction, library):
-    law, t, x = swing(friction)
+    wanted, t = {"sin(x)": -9.81} | ({"vx": -friction} if friction else {}), np.linspace(0, 20, 700)
+    law = PolynomialSystem.from_terms({"x": {"vx": 1.0}, "vx": wanted}, library=PENDULUM)
+    x = noisy(law.simulate(t, [1.5, 0.0])[:, :1], 0.01)
     found = vl.discover(t, x, order=2, library=library)
     if library == PENDULUM:
         assert (found.system.support == law.support).all()
-    wanted = {"sin(x)": -9.81} | ({"vx": -friction} if friction else {})
     rows = np.flatnonzero(found.system.support[:, 1])
     assert {found.terms[k] for k in rows} == set(wanted)
     for k in rows:
@@ -53,10 +46,8 @@ def thrown(noise=0.01):
     equations = {q: {f"v{q}": 1.0} for q in "xyz"}
     equations |= {f"v{q}": {f"|v|v_{q}": -0.05} for q in "xyz"}
     equations["vz"]["1"] = -9.81
-    law, rng = PolynomialSystem.from_terms(equations, library=DRAG), np.random.default_rng(0)
-    t = np.linspace(0, 2, 600)
-    x = law.simulate(t, [0, 0, 1.5, 8, 3, 9])[:, :3]
-    return t, x + noise * x.std(axis=0) * rng.normal(size=x.shape)
+    law, t = PolynomialSystem.from_terms(equations, library=DRAG), np.linspace(0, 2, 600)
+    return t, noisy(law.simulate(t, [0, 0, 1.5, 8, 3, 9])[:, :3], noise)
 
 
 def test_one_throw_tells_quadratic_drag_that_is_the_same_in_all_directions():
@@ -86,9 +77,7 @@ ENZYME = {"x": {"x": -2.0, "x x'": -2.0}}  # Michaelis and Menten: x' = -x/(.5 +
 )
 def test_fractions_are_found_exactly(equations, start, span, noise, tmp_path):
     law, t = PolynomialSystem.from_terms(equations, library=FRACTION), np.linspace(0, span, 800)
-    x = law.simulate(t, start)
-    x += noise * x.std(axis=0) * np.random.default_rng(0).normal(size=x.shape)
-    found = vl.discover(t, x, library=FRACTION)
+    found = vl.discover(t, noisy(law.simulate(t, start), noise), library=FRACTION)
     assert (found.system.support == law.support).all()
     np.testing.assert_allclose(found.coefficients, law.coefficients, rtol=0.02)
     assert "/ (1 + (" in found.equations()

@@ -5,6 +5,7 @@ import json
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from helpers import noisy
 
 import vidsindy_lite as vl
 from vidsindy_lite import Library, PolynomialSystem
@@ -119,8 +120,7 @@ def pendulum():
     """A pendulum's law among two functions, of which it has one."""
     terms = {"x": {"vx": 1.0}, "vx": {"sin(x)": -9.81, "vx": -0.1}}
     law = PolynomialSystem.from_terms(terms, library=Library.polynomial(1) + Library.fourier(1))
-    x = law.simulate(T, [1.5, 0.0])[:, :1]
-    x += 0.01 * x.std() * np.random.default_rng(0).normal(size=x.shape)
+    x = noisy(law.simulate(T, [1.5, 0.0])[:, :1], 0.01)
     found = vl.discover(T, x, order=2, library=Library.polynomial(1) + HELD)
     used = found.system.exponents[found.system.support.any(axis=1), 2:].any(axis=0)
     assert used.tolist() == [True, False]

@@ -41,12 +41,6 @@ def test_a_thing_is_where_it_differs():
     assert len(found_in((10, 20, 4, 4, 2.0), level=2.5).frame) == 0
 
 
-def test_a_thing_is_plainer_the_more_it_differs_and_the_larger_it_is_up_to_8_pixels():
-    assert found_in((10, 20, 4, 4, 2.0)).quality == pytest.approx(np.tanh(0.5))
-    assert found_in((10, 20, 9, 6, 8.0)).quality == pytest.approx(np.tanh(2))
-    assert found_in((10, 20, 2, 2, 8.0)).quality == pytest.approx(np.tanh(2) / 2)
-
-
 def test_what_fills_the_image_and_what_is_of_two_pixels_is_nothing():
     assert len(found_in((5, 5, 2, 1, 9.0)).frame) == 0
     # Of 2400 pixels 30 % are 720.

@@ -42,7 +42,7 @@ def column(u, v, size, confidence):
     return [u, v, size, size, confidence]
 
 
-def test_predictions_that_agree_are_averaged():
+def test_predictions_that_agree_are_averaged_and_the_surest_comes_first():
     predictions = np.array([
         column(100, 50, 20, 0.9), column(102, 50, 20, 0.9), column(100, 53, 22, 0.6),
         column(104, 60, 20, 0.7),  # of another place,
@@ -51,9 +51,6 @@ def test_predictions_that_agree_are_averaged():
     (found,) = detections(predictions)
     np.testing.assert_allclose(found.centre, np.array([90 + 91.8 + 60, 45 + 45 + 31.8]) / 2.4)
     assert found.confidence == 0.9
-
-
-def test_the_surest_comes_first_and_the_unsure_not_at_all():
     predictions = np.array(
         [column(300, 50, 20, 0.6), column(100, 50, 20, 0.8), column(200, 90, 20, LEAST - 0.01)]
     ).T

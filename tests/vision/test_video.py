@@ -22,7 +22,6 @@ from vidsindy_lite import track
 from vidsindy_lite.vision import frame_clock, video
 from vidsindy_lite.vision.rendering import Scene, render, render_video
 from vidsindy_lite.vision.video import (
-    Reel,
     pick_frames,
     read_frame,
     read_video,
@@ -571,22 +570,3 @@ def test_reduced_pixels_are_means_the_last_row_and_column_repeated(factor):
     steps = {2: 1, 3: 1, 4: 2, 6: 2, 8: 3}[factor]
     np.testing.assert_allclose(reduce(image, factor), means, atol=0.51 * steps)
     assert reduce(image, 1) is image
-
-
-@pytest.mark.parametrize("longest", [None, 16])
-@pytest.mark.parametrize(("room", "reads"), [(1.0, 1), (0.99, 2)])
-def test_frames_are_read_once_if_there_is_room(tmp_path, monkeypatch, room, reads, longest):
-    images = np.random.default_rng(0).integers(0, 256, (5, 16, 32, 3), np.uint8)
-    reel = Reel(write_video(tmp_path / "clip.mov", iter(images)), longest)
-    small = np.array([reduce(image, reel.factor) for image in images])
-    next(iter(reel))  # of which not all was seen
-    np.testing.assert_array_equal(list(reel), small)
-    monkeypatch.setattr(video, "_ROOM", room * small.nbytes)
-    opened = []
-    monkeypatch.setattr(video, "read_video", lambda *given: opened.append(1) or read_video(*given))
-    reel = Reel(reel.path, longest)
-    assert reel.whole.few == (longest is None and room == 1)
-    np.testing.assert_array_equal(list(reel.pick([0, 2, 4, 7])), small[[0, 2, 4]])
-    for _ in range(2):
-        np.testing.assert_array_equal(list(reel), small)
-    assert len(opened) == reads
