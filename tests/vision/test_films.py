@@ -89,6 +89,8 @@ def test_a_colour_that_the_film_shows_mixed_with_its_ground_is_not_lost(tmp_path
     found, error = followed(path, ROUND, Hint(colour=(40, 230, 110)))
     assert np.nanpercentile(error, 95) < 1.5
     assert any("has the colour" in doubt for doubt in found.warnings) == (mixed > 0.4)
+    lost = track(path, target=Hint(colour=(230, 40, 110)))
+    assert any("colour (230, 40, 110)" in doubt for doubt in lost.warnings)
 
 
 SIZE = 200, 150

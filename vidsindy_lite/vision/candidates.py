@@ -109,7 +109,7 @@ class Hint:
         if (middle < 0).any() or (middle >= size).any():
             raise ValueError(
                 f"box: must have its middle in the image of {size[0]} x {size[1]} pixels, "
-                f"got {_told(self.box)}"
+                f"got {as_written(self.box)}"
             )
         return self.frame, (middle - (factor - 1) / 2) / factor, sides / factor
 
@@ -128,11 +128,11 @@ class Hint:
         """Has what is followed, of this red, green and blue, another colour than is told?"""
         if self.colour is None or _alike(colour[None], np.array(self.colour, float))[0] > 0.5:
             return ()
-        here = _told(colour.round().tolist())
-        return (f"what is followed has the colour {here}, not {_told(self.colour)} as told",)
+        here = as_written(colour.round().tolist())
+        return (f"what is followed has the colour {here}, not {as_written(self.colour)} as told",)
 
 
-def _told(numbers: Sequence[float]) -> str:
+def as_written(numbers: Sequence[float]) -> str:
     """Numbers as a user writes them."""
     return f"({', '.join(f'{number:g}' for number in numbers)})"
 
