@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from helpers import full_disk
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
@@ -179,10 +180,7 @@ def test_bad_tracks_are_told(tracked, capsys, options, message):
 
 @pytest.mark.parametrize("degree", ["2", "7"])
 def test_a_full_disk_is_one_line_and_law_or_refusal_are_told(tracked, capsys, monkeypatch, degree):
-    def full(path, *_):
-        raise OSError(28, "No space left on device", str(path))
-
-    monkeypatch.setattr(Path, "write_bytes", full)
+    monkeypatch.setattr(Path, "write_bytes", full_disk)
     command = ["discover", "--rig", "rig.toml", "--fps", "25", "--degree", degree, "--tracks"]
     assert main([*command, "a.csv", "b.csv", "c.csv"]) == 2
     shown = capsys.readouterr()

@@ -11,6 +11,7 @@ from importlib.metadata import packages_distributions
 
 import numpy as np
 import pytest
+from helpers import full_disk
 
 import vidsindy_lite as vl
 from vidsindy_lite import storage
@@ -100,10 +101,7 @@ def test_a_full_disk_leaves_the_old_law_and_rig(saved, tmp_path, monkeypatch, ca
     rig.save(tmp_path / "rig.toml")
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
 
-    def full(path, *rest):
-        raise OSError(28, "No space left on device", str(path))
-
-    monkeypatch.setattr(f"pathlib.Path.{call}", full)
+    monkeypatch.setattr(f"pathlib.Path.{call}", full_disk)
     for save in (law.save, rig.save):
         for name in (*before, "new"):
             with pytest.raises(OSError, match="No space left"):

@@ -19,6 +19,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
+from helpers import full_disk
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
@@ -161,13 +162,10 @@ def test_an_earlier_report_is_replaced_and_nothing_else(case, old):
 
 @pytest.mark.parametrize("call", ["write_bytes", "replace", None])
 def test_a_report_that_fails_leaves_what_was_there(case, old, tmp_path, monkeypatch, call):
-    def full(path, *rest):
-        raise OSError(28, "No space left on device", str(path))
-
     found, paths = case
     with monkeypatch.context() as patch:
         if call:
-            patch.setattr(Path, call, full)
+            patch.setattr(Path, call, full_disk)
         for folder in (old, tmp_path / "new"):
             with pytest.raises(OSError, match="No space left on device|gone"):
                 write_report(found, None if call else [*paths[:2], old / "gone.mov"], folder)

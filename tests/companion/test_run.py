@@ -1,19 +1,17 @@
 """The runner on tiny notebooks: what it makes of a good one, how each bad one is seen to fail."""
 
-import errno
 import os
 import re
 import shutil
 import subprocess
 import sys
-import time
 from functools import cache
 
 import jupytext
 import nbformat
 import psutil
 import pytest
-from helpers import TinyRepository
+from helpers import TinyRepository, full_disk, wait_for
 
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.companion import run as runner
@@ -117,10 +115,6 @@ def test_full_run_writes_into_the_repository(executed_once):
     assert "| full" in cleaned.cells[3].outputs[0].data["text/markdown"]
 
 
-def full(path, content):
-    raise OSError(errno.ENOSPC, "No space left on device")
-
-
 def test_what_differs_is_refreshed_and_nothing_else_though_a_disk_was_full(
     good, no_kernel, monkeypatch
 ):
@@ -129,7 +123,7 @@ def test_what_differs_is_refreshed_and_nothing_else_though_a_disk_was_full(
     record.write_text(record.read_text().replace("1.0", "1.01"))
     for module in ("compare", "run"):
         with monkeypatch.context() as patch:
-            patch.setattr(f"vidsindy_lite.companion.{module}.write_file", full)
+            patch.setattr(f"vidsindy_lite.companion.{module}.write_file", full_disk)
             (outcome,) = run(root=good.root)
         assert "No space left on device" in outcome.error
     (outcome,) = run(root=good.root)
@@ -202,14 +196,6 @@ def test_an_edit_meanwhile_is_not_taken_for_a_run_of_this_code(good, instant, mo
     monkeypatch.setattr(runner, "_key", lambda source: next(hashes))
     assert executed(run(root=good.root)) == ["01_first"]
     assert executed(run(root=good.root)) == ["01_first"]
-
-
-def wait_for(condition):
-    """Poll until a condition holds; fail after a minute."""
-    deadline = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
 
 
 def start(tiny):

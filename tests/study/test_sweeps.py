@@ -1,6 +1,5 @@
 """Sweeps in small clones of the repository: killed, edited, damaged, on a cluster."""
 
-import errno
 import hashlib
 import json
 import math
@@ -8,11 +7,11 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from helpers import full_disk, wait_for
 
 from vidsindy_lite.storage import PACKAGE
 from vidsindy_lite.study.sweeps import remember, sweep
@@ -69,29 +68,24 @@ class Clone:
     def __init__(self, root):
         self.root, self.calls = root, root / "calls.txt"
         self.package = root / "vidsindy_lite"
-        self.package.mkdir()
         (root / "notebooks").mkdir()
+        for room in ("study", "companion"):
+            (self.package / room).mkdir(parents=True)
         (root / "sweep.py").write_text(SWEEP)
-        (self.package / "study").mkdir()
+        files = {"CALLS": str(self.calls), "THREADS": str(root / "threads.txt")}
+        self.environment = os.environ | {"PYTHONPATH": str(root)} | files
         for front_door in (self.package, self.package / "study"):
             (front_door / "__init__.py").touch()
         (self.package / "toy.py").write_text(TOY)
         (self.package / "powers.py").write_text("def square(number):\n    return number**2\n")
-        (self.package / "companion").mkdir()
         (self.package / "companion" / "pages.py").write_text("LINE_WIDTH = 1\n")
-        used = ("arrays.py", "checks.py", "storage.py", "values.py", "study/sweeps.py")
-        for module in used:
+        for module in ("arrays.py", "checks.py", "storage.py", "values.py", "study/sweeps.py"):
             (self.package / module).write_bytes((PACKAGE / module).read_bytes())
 
     def edit(self, module, old, new):
         path = self.package / module
         assert old in path.read_text()
         path.write_text(path.read_text().replace(old, new))
-
-    @property
-    def environment(self):
-        files = {"CALLS": str(self.calls), "THREADS": str(self.root / "threads.txt")}
-        return os.environ | {"PYTHONPATH": str(self.root)} | files
 
     def start(self, tasks, jobs=2, **environment):
         """A process that sweeps over tasks, each a list of a number and a pause in seconds."""
@@ -103,7 +97,6 @@ class Clone:
         )  # fmt: skip
 
     def sweep(self, tasks, **environment):
-        """Results of a sweep to its end."""
         process = self.start(tasks, **environment)
         output, errors = process.communicate(timeout=120)
         assert process.returncode == 0, errors
@@ -145,14 +138,6 @@ def results_of(tasks):
     return [
         [number**2, np.random.default_rng(number).normal(size=3).tolist()] for number, _ in tasks
     ]
-
-
-def wait_for(condition):
-    """Poll until a condition holds; fail after a minute."""
-    deadline = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
 
 
 # ------------------------------------------------------------------------------------- what is kept
@@ -326,10 +311,7 @@ def test_one_task_is_remembered_by_whoever_asks_next(cache):
 
 
 def test_a_full_disk_costs_the_storing_not_the_result(cache, monkeypatch):
-    def full(path, content):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr("vidsindy_lite.study.sweeps.write_file", full)
+    monkeypatch.setattr("vidsindy_lite.study.sweeps.write_file", full_disk)
     with pytest.warns(UserWarning, match="a result is not stored: .*No space left"):
         assert remember(squared, Holder(3)) == 9
 
