@@ -46,24 +46,17 @@ def here(folder, tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (None, "error: videos: no such video file, got 'bad.avi'"),
-        (b"no video", "error: videos: must be a video file that PyAV can read, got 'bad.avi'"),
-        (b"", "must be a video file, got the empty file 'bad.avi'"),
-        ("half", "bad.avi must hold the 210 frames that its header states, got"),
-    ],
-)
-def test_a_bad_file_gives_one_error_and_no_report(here, capsys, content, message):
+def test_a_bad_file_gives_one_error_and_no_report(here, capsys):
     whole = (here / "c.avi").read_bytes()
-    if content is not None:
-        (here / "bad.avi").write_bytes(whole[: len(whole) // 2] if content == "half" else content)
-    assert main(["discover", "a.avi", "b.avi", "bad.avi", "--rig", "rig.toml"]) == 2
-    (error,) = [line for line in capsys.readouterr().err.splitlines() if "error" in line]
-    assert message in error
-    assert not (here / "report").exists()
-    assert not list(here.glob(".report*"))
+    for content, message in (
+        (b"no video", "error: videos: must be a video file that PyAV can read, got 'bad.avi'"),
+        (whole[: len(whole) // 2], "bad.avi must hold the 210 frames that its header states, got"),
+    ):
+        (here / "bad.avi").write_bytes(content)
+        assert main(["discover", "a.avi", "b.avi", "bad.avi", "--rig", "rig.toml"]) == 2
+        (error,) = [line for line in capsys.readouterr().err.splitlines() if "error" in line]
+        assert message in error
+    assert not list(here.glob("*report*"))
 
 
 @pytest.mark.parametrize(

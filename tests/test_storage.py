@@ -22,7 +22,6 @@ from vidsindy_lite.storage import (
     RESULTLESS,
     code_hash,
     read_tree,
-    repository_root,
     write_file,
 )
 from vidsindy_lite.vision import read_tracks
@@ -125,12 +124,6 @@ def test_a_link_stays_one_and_a_device_too(tmp_path):
 
 
 # ----------------------------------------------------------------------------------- the repository
-
-
-def test_repository_is_found_from_inside(tiny, tmp_path):
-    assert repository_root(tiny.notebooks) == tiny.root
-    with pytest.raises(FileNotFoundError, match="repository: expected to be inside a clone"):
-        repository_root(tmp_path.parent)
 
 
 PARTS = {

@@ -40,12 +40,6 @@ def site(built):
 
 
 @pytest.fixture(scope="module")
-def conf():
-    """What makes the site, as a module."""
-    return SimpleNamespace(**runpy.run_path(str(ROOT / "docs" / "conf.py")))
-
-
-@pytest.fixture(scope="module")
 def browser(tmp_path_factory):
     with Browser(tmp_path_factory.mktemp("profile")) as browser:
         yield browser
@@ -102,7 +96,8 @@ def test_formulas_and_figures_are_drawn(site, browser):
 @pytest.mark.parametrize(
     "origin", ["https://github.com/some-one/film.law.git\n", "git@github.com:some-one/film.law.git"]
 )
-def test_a_notebook_of_a_repository_on_github_opens_on_binder_and_colab(conf, origin):
+def test_a_notebook_of_a_repository_on_github_opens_on_binder_and_colab(origin):
+    conf = SimpleNamespace(**runpy.run_path(str(ROOT / "docs" / "conf.py")))
     for elsewhere in ("", "/home/me/film", "https://example.org/github.com.git"):
         assert conf.launchers("notebooks/01_projection_proofs", elsewhere) == ""
     told = conf.launchers("notebooks/01_projection_proofs", origin)
