@@ -23,10 +23,7 @@ ITEM = re.compile(r"\n\s*\n|\n(?=\* )")
 
 
 def pages(root: Path) -> dict[str, str]:
-    """What README and docs/ say after the notebooks: the tour's law, and all claims; by name.
-
-    They stand between a line ``<!-- name -->`` and the next ``<!-- end -->``.
-    """
+    """What README and docs/ say after the notebooks, from ``<!-- name -->`` to ``<!-- end -->``."""
     law = json.loads((root / "figures" / "tour.json").read_text("utf-8"))["numbers"]["equations"]
     listed = []
     for page in [root / "README.md", *sorted((root / "notebooks").glob("*.py"))]:
@@ -50,13 +47,7 @@ def pages(root: Path) -> dict[str, str]:
 
 
 def claims_of(page: Path) -> list[tuple[str, list[str]]]:
-    """The claims of README.md or of a notebook's source half with their checks, as for docs/.
-
-    Raises
-    ------
-    ValueError
-        If a claim has no check, or names one that is not there.
-    """
+    """The claims of README.md or of a notebook's source half with their checks, as for docs/."""
     if page.suffix == ".md":
         items = [item for item in ITEM.split(page.read_text("utf-8")) if BY.search(item)]
     else:

@@ -162,10 +162,7 @@ def source_problems(path):
 
 
 def number_problems(path, figures, references=REFERENCES):
-    """Where the tables of a quick run hold other numbers than the committed ones.
-
-    By more than the tolerance that a table states for a column, or else by a thousandth.
-    """
+    """Where the tables of a quick run hold other numbers than the committed ones."""
     if not figures.exists():
         return []
     records = read_records(figures) | read_records(references)
@@ -242,12 +239,7 @@ def run_problems(path, folder, cache, references=REFERENCES, seed=None):
 )
 @pytest.mark.parametrize("path", sorted(NOTEBOOKS, key=LENGTH), ids=lambda path: path.stem)
 def test_quick_run(path, seed, tmp_path, shared_cache):
-    """No sentence holds by a hair.
-
-    Every track and trajectory is disturbed by a relative 1e-9, see `test_disturbed`, and the tables
-    are compared with those of a run that nothing disturbs. The longest begin, so that none ends
-    alone.
-    """
+    """No sentence holds by a hair: tracks are disturbed, tables compared with undisturbed ones."""
     problems = run_problems(path, tmp_path, shared_cache, seed=seed)
     copy = f"if that is meant, copy the tables from build/quick/figures to {REFERENCES}"
     assert not problems, "\n".join([*problems, copy])

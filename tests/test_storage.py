@@ -1,7 +1,4 @@
-"""Files: whatever is wrong with one from outside is one line; they are replaced in one step.
-
-And where the repository is, the hash of its code, what has to be installed.
-"""
+"""Files: what is wrong with one is one line, each is replaced in one step; the hash of code."""
 
 import ast
 import json
@@ -123,9 +120,6 @@ def test_a_link_stays_one_and_a_device_too(tmp_path):
     rig.save("/dev/null")
 
 
-# ----------------------------------------------------------------------------------- the repository
-
-
 PARTS = {
     "dynamics/law.py": "import numpy\nLEAST = 1\n",
     "vision/weights.json": "{}",
@@ -180,12 +174,8 @@ def imported(folder):
 
 def unlisted(modules, listed):
     """Modules of other distributions than those that are listed."""
-    homes = packages_distributions()
-    return {
-        module
-        for module in modules
-        if module in homes and not {_plain(name) for name in homes[module]} & listed
-    }
+    homes = {name: set(map(_plain, home)) for name, home in packages_distributions().items()}
+    return {module for module in modules & homes.keys() if not homes[module] & listed}
 
 
 def _plain(name):
@@ -202,8 +192,7 @@ def required():
 
 
 def test_all_that_is_imported_is_listed_in_both():
-    modules = imported("vidsindy_lite") | imported("tests") | imported("notebooks")
-    modules |= imported("docs")
+    modules = set().union(*map(imported, ("vidsindy_lite", "tests", "notebooks", "docs")))
     for listed in required():
         assert unlisted(modules, listed | {"vidsindy-lite"}) == set()
 

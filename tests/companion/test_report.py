@@ -18,7 +18,7 @@ import jsonschema
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from browser import CHROMIUM, Browser
+from browser import Browser, needs_browser
 from helpers import full_disk
 
 import vidsindy_lite as vl
@@ -37,8 +37,6 @@ from vidsindy_lite.companion.report import (
 )
 from vidsindy_lite.pipeline import Observation, Refused
 from vidsindy_lite.vision import read_tracks
-
-needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here to open the page in")
 
 
 @pytest.fixture(scope="module")
@@ -269,7 +267,7 @@ def test_a_refusal_shows_the_tracks_and_the_step(case, tmp_path, with_videos):
     np.testing.assert_allclose(read_tracks(page.parent / "tracks.csv")[0].pixels, tracks[0])
 
 
-@needs_chromium
+@needs_browser
 def test_a_telephone_shows_the_report_without_scrolling_sideways(page, case, tmp_path):
     found, paths = case
     tracks = [track[:20] for track in found.tracks]
@@ -282,8 +280,6 @@ def test_a_telephone_shows_the_report_without_scrolling_sideways(page, case, tmp
             assert seen["width"] <= 390
             assert (seen["errors"], seen["requests"], seen["broken"]) == ([], [], [])
 
-
-# -------------------------------------------------- the film of the law, and the page of pick
 
 LATER = 4  # frames
 
@@ -378,7 +374,7 @@ DRAG = """(() => {
 })()"""
 
 
-@needs_chromium
+@needs_browser
 @pytest.mark.parametrize(("width", "drawn"), [(390, "box"), (1280, "click")])
 def test_a_box_becomes_the_line_to_paste(videos, tmp_path, width, drawn):
     page = write_pick_page(videos, tmp_path / "pick.html")

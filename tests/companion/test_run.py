@@ -229,20 +229,17 @@ def test_a_run_that_is_killed_leaves_no_process_and_goes_on_later(good, no_kerne
     assert not (good.root / "build" / "runs" / "02_long-full" / "running").exists()
 
 
-@pytest.mark.parametrize(
-    ("names", "chosen"),
-    [
+def test_names_of_notebooks(tiny):
+    for name in ("01_first", "02_second", "02_twin"):
+        tiny.write(name)
+    for names, chosen in (
         ([], ["01_first", "02_second", "02_twin"]),
         (["01"], ["01_first"]),
         (["02_second", "01_first"], ["01_first", "02_second"]),
         (["02"], ["02_second", "02_twin"]),
         (["notebooks/02_twin.ipynb", "elsewhere/01_first.py"], ["01_first", "02_twin"]),
-    ],
-)
-def test_names_of_notebooks(tiny, names, chosen):
-    for name in ("01_first", "02_second", "02_twin"):
-        tiny.write(name)
-    assert [path.stem for path in select_notebooks(names, tiny.root)] == chosen
+    ):
+        assert [path.stem for path in select_notebooks(names, tiny.root)] == chosen
 
 
 def test_what_makes_no_sense_is_refused(tiny, tmp_path, monkeypatch, capsys):

@@ -9,16 +9,13 @@ from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import pytest
-from browser import CHROMIUM, Browser
+from browser import Browser, needs_browser
 
 from vidsindy_lite.companion.artifacts import save_slider
 from vidsindy_lite.storage import PACKAGE
 
 ROOT = PACKAGE.parent
 LAPTOP, PHONE = 1280, 390  # CSS pixels
-needs_browser = pytest.mark.skipif(
-    CHROMIUM is None, reason="no Chromium here to open the pages in: apt-get install chromium"
-)
 
 
 @pytest.fixture(scope="module")
@@ -81,16 +78,6 @@ def test_every_page_can_be_read(site, browser, width):
     assert len(pages) > len(list((ROOT / "notebooks").glob("*.py")))
     found = {str(page.relative_to(site)): page_problems(browser, page, width) for page in pages}
     assert {page: problems for page, problems in found.items() if problems} == {}
-
-
-@pytest.mark.slow
-@needs_browser
-def test_formulas_and_figures_are_drawn(site, browser):
-    seen = browser.open(site / "notebooks" / "03_camera_learning.html")
-    assert seen["formulas"] > 10
-    executed = (ROOT / "notebooks" / "03_camera_learning.ipynb").read_text("utf-8")
-    assert seen["images"] == executed.count('"image/png":') + executed.count("<img ") >= 5
-    assert r"\mathbf" not in seen["text"]
 
 
 @pytest.mark.parametrize(
@@ -170,8 +157,12 @@ def test_nothing_is_warned_of_every_link_leads_to_a_file_and_every_module_has_a_
 
 @pytest.mark.slow
 @needs_browser
-def test_pages_lead_to_each_other_and_words_to_pages(site, browser):
-    browser.open(site / "notebooks" / "03_camera_learning.html")
+def test_a_page_draws_its_formulas_and_figures_and_leads_to_others(site, browser):
+    seen = browser.open(site / "notebooks" / "03_camera_learning.html")
+    assert seen["formulas"] > 10
+    executed = (ROOT / "notebooks" / "03_camera_learning.ipynb").read_text("utf-8")
+    assert seen["images"] == executed.count('"image/png":') + executed.count("<img ") >= 5
+    assert r"\mathbf" not in seen["text"]
     for selector, end in (
         ("a.prev-page", "02_videos_and_tracking.html"),
         ("a.next-page", "04_spline_ado.html"),

@@ -96,18 +96,13 @@ class Clone:
             text=True, start_new_session=True,
         )  # fmt: skip
 
-    def sweep(self, tasks, **environment):
+    def sweep(self, tasks, status=0, **environment):
+        """Results of a sweep to its end, or what it raises."""
         process = self.start(tasks, **environment)
         output, errors = process.communicate(timeout=120)
-        assert process.returncode == 0, errors
-        return json.loads(output)
-
-    def fail(self, tasks, **environment):
-        """What a sweep that fails raises; what its workers leave behind may be told after it."""
-        process = self.start(tasks, **environment)
-        _, errors = process.communicate(timeout=120)
-        assert process.returncode == 1
-        return [line for line in errors.splitlines() if "Error: " in line][-1]
+        assert process.returncode == status, errors
+        raised = [line for line in errors.splitlines() if "Error: " in line]
+        return raised[-1] if status else json.loads(output)
 
     def called(self):
         """Numbers of the tasks that were computed since the last start."""
@@ -138,9 +133,6 @@ def results_of(tasks):
     return [
         [number**2, np.random.default_rng(number).normal(size=3).tolist()] for number, _ in tasks
     ]
-
-
-# ------------------------------------------------------------------------------------- what is kept
 
 
 @pytest.mark.slow
@@ -211,8 +203,6 @@ def test_a_planted_file_is_read_and_never_executed(cache, monkeypatch, result):
     assert not (cache / "planted").exists()
 
 
-# --------------------------------------------------------------------------------------- a cluster
-
 CLUSTER = """\
 import sys
 import time
@@ -246,16 +236,13 @@ def test_a_cluster_gives_the_same_results_and_only_with_the_same_code(clone, clu
     assert clone.sweep(tasks, VIDSINDY_DASK=cluster) == results_of(tasks)
     assert clone.called() == [1, 2, 3]
     assert set(clone.stored()) == {1, 2, 3}
-    error = clone.fail([[5, 0.0], [-3, 1.0]], VIDSINDY_DASK=cluster)
+    error = clone.sweep([[5, 0.0], [-3, 1.0]], 1, VIDSINDY_DASK=cluster)
     assert error.endswith("square(Task(number=-3, pause=1.0)) raised ArithmeticError: below zero")
     assert 5 in clone.stored()
     clone.edit("powers.py", "number**2", "number * number")
-    error = clone.fail([[1, 0.0]], VIDSINDY_DASK=cluster)
+    error = clone.sweep([[1, 0.0]], 1, VIDSINDY_DASK=cluster)
     assert "all workers must have this very code of vidsindy_lite, got other code on tcp" in error
     assert clone.called() == []
-
-
-# ---------------------------------------------------------------------------------------- bad input
 
 
 @pytest.fixture
