@@ -45,13 +45,12 @@ def browser(tmp_path_factory):
 def page_problems(browser, page, width):
     """What a reader would miss on a page, or have to scroll sideways for."""
     seen = browser.open(page, width)
-    problems = [f"broken image {image}" for image in seen["broken"]]
-    problems += [f"image without words {image}" for image in seen["wordless"]]
-    problems += [f"code wider than its box: {code}" for code in seen["cut"]]
-    problems += [f"console: {error}" for error in seen["errors"]]
-    problems += [f"asks the network for {url}" for url in seen["requests"]]
-    problems += [f"link to no place on the page: #{anchor}" for anchor in seen["dead"]]
-    problems += [f"formula: {formula}" for formula in seen["unread"]]
+    words = {
+        "broken": "broken image ", "wordless": "image without words ", "errors": "console: ",
+        "cut": "code wider than its box: ", "requests": "asks the network for ",
+        "dead": "link to no place on the page: #", "unread": "formula: ",
+    }  # fmt: skip
+    problems = [f"{said}{one}" for kind, said in words.items() for one in seen[kind]]
     if not seen["text"].strip():
         problems.append("shows no text")
     if seen["width"] > width:

@@ -308,10 +308,3 @@ def squared(task):
 
 
 squared.__module__ = "vidsindy_lite.toy"
-
-
-def test_the_study_is_imported_without_what_only_parts_of_it_need():
-    heavy = ("torch", "pysindy", "sklearn", "pandas", "matplotlib", "seaborn", "joblib")
-    code = f"import sys, vidsindy_lite.study; print([m for m in {heavy} if m in sys.modules])"
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert ran.stdout.strip() == "[]"
