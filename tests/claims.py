@@ -1,9 +1,8 @@
 """The claims of the README and of the notebooks, each with the check behind it.
 
-After a claim stands a comment that no reader sees, ``<!-- by: CHECK; CHECK -->``. A check is a part
-of an assertion in the notebook's code; ``05: part`` is one in notebook 05; a path with a name is a
-test as pytest names it. The claim is false if one of them fails, so it has at least one. Beside
-them, ``figure ID`` and a page of docs/ say where its numbers are shown.
+After a claim stands a hidden comment, ``<!-- by: CHECK; CHECK -->``. A check, at least one, is a
+part of an assertion in the notebook's code, ``05: part`` in notebook 05, or a test as pytest names
+it; ``figure ID`` and a page of docs/ say where its numbers are shown.
 """
 
 import ast

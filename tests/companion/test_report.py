@@ -125,10 +125,7 @@ OLD = "<title>Law of a moving target</title> old"
 
 @pytest.fixture
 def old(tmp_path, monkeypatch):
-    """A folder with an earlier report, as a link to where it is, and a file of somebody's.
-
-    Without pictures: it is for tests of the files.
-    """
+    """A link to a folder with an earlier report and a file of somebody's; without pictures."""
     monkeypatch.setattr(report, "_figures", lambda *_: iter(()))
     (tmp_path / "there").mkdir()
     (tmp_path / "report").symlink_to(tmp_path / "there")
@@ -305,7 +302,7 @@ def decoded(film):
         return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
 
-def test_the_law_is_drawn_where_the_target_is(tmp_path):
+def test_the_law_is_drawn_where_the_target_is_and_a_long_film_shown_in_steps(tmp_path):
     found, paths = observed(tmp_path, 150)
     frames = decoded(law_over_videos(found, paths))
     assert len(frames) == 150
@@ -318,9 +315,6 @@ def test_the_law_is_drawn_where_the_target_is(tmp_path):
             ring = found.rig.cameras[i].project(found.x[[k]])[0]
             assert np.hypot(u - ring[0], v - ring[1]).min() < 10
     assert len(law_over_videos(found, paths)) < 1_000_000
-
-
-def test_a_long_film_is_shown_in_steps(tmp_path):
     found, paths = observed(tmp_path, 201)
     assert len(decoded(law_over_videos(found, paths))) == 101
 
