@@ -66,7 +66,6 @@ def test_the_residual_is_that_of_the_given_lags(case):
 
 
 def test_a_law_from_noisy_tracks_does_not_bend_the_path_to_fit_their_noise():
-    """Three cameras see Lorenz' system with noise of 15 %."""
     truth = study.SYSTEMS["Lorenz"].shift(study.REFERENCE_OFFSET)
     t, x = truth.trajectory(700)
     rig, rng = vl.Rig.around(x), np.random.default_rng(3)

@@ -222,7 +222,6 @@ def checked(folder):
 
 
 def test_of_tracks_alone_a_doubted_law_in_turned_axes(case, tmp_path, monkeypatch):
-    """Written where one works; its curve is in the axes of the rig."""
     found, _ = case
     turn = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
     turned = replace(found.discovery, orientation=turn)

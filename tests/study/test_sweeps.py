@@ -191,7 +191,6 @@ def test_what_is_stored_is_found_unless_it_is_damaged_or_of_other_code(clone):
     ids=range(4),
 )
 def test_a_planted_file_is_read_and_never_executed(cache, monkeypatch, result):
-    """Its digest is right, but it is no result."""
     monkeypatch.chdir(cache)
     assert remember(squared, Holder(3)) == 9
     (file,) = cache.rglob("*.json")
