@@ -7,10 +7,14 @@ import time
 import urllib.request
 from pathlib import Path
 
+import pytest
 from websocket import create_connection
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
+needs_browser = pytest.mark.skipif(
+    CHROMIUM is None, reason="no Chromium here to open pages in: apt-get install chromium"
+)
 SEEN = """(async () => {
     if (window.MathJax) await new Promise(drawn => MathJax.Hub.Queue(drawn));
     const all = selector => [...document.querySelectorAll(selector)];
@@ -74,11 +78,7 @@ class Browser:
         return message["result"]
 
     def open(self, page: Path, width: int = 1280, height: int = 900) -> dict:
-        """Open a page in a window of a width in CSS pixels; what it shows, and what it complains.
-
-        Beside what `SEEN` measures: `errors`, the messages of its console, and `requests`, the
-        addresses outside the disk that it asked for.
-        """
+        """What `SEEN` measures of a page, the errors of its console, and what it asks for."""
         self.command(
             "Emulation.setDeviceMetricsOverride",
             width=width, height=height, deviceScaleFactor=1, mobile=width < 600,

@@ -1,9 +1,8 @@
 """The claims of the README and of the notebooks, each with the check behind it.
 
-After a claim stands a comment that no reader sees, ``<!-- by: CHECK; CHECK -->``. A check is a part
-of an assertion in the notebook's code; ``05: part`` is one in notebook 05; a path with a name is a
-test as pytest names it. The claim is false if one of them fails, so it has at least one. Beside
-them, ``figure ID`` and a page of docs/ say where its numbers are shown.
+After a claim stands a hidden comment, ``<!-- by: CHECK; CHECK -->``. A check, at least one, is a
+part of an assertion in the notebook's code, ``05: part`` in notebook 05, or a test as pytest names
+it; ``figure ID`` and a page of docs/ say where its numbers are shown.
 """
 
 import ast
@@ -23,10 +22,7 @@ ITEM = re.compile(r"\n\s*\n|\n(?=\* )")
 
 
 def pages(root: Path) -> dict[str, str]:
-    """What README and docs/ say after the notebooks: the tour's law, and all claims; by name.
-
-    They stand between a line ``<!-- name -->`` and the next ``<!-- end -->``.
-    """
+    """What README and docs/ say after the notebooks, from ``<!-- name -->`` to ``<!-- end -->``."""
     law = json.loads((root / "figures" / "tour.json").read_text("utf-8"))["numbers"]["equations"]
     listed = []
     for page in [root / "README.md", *sorted((root / "notebooks").glob("*.py"))]:
@@ -50,13 +46,7 @@ def pages(root: Path) -> dict[str, str]:
 
 
 def claims_of(page: Path) -> list[tuple[str, list[str]]]:
-    """The claims of README.md or of a notebook's source half with their checks, as for docs/.
-
-    Raises
-    ------
-    ValueError
-        If a claim has no check, or names one that is not there.
-    """
+    """The claims of README.md or of a notebook's source half with their checks, as for docs/."""
     if page.suffix == ".md":
         items = [item for item in ITEM.split(page.read_text("utf-8")) if BY.search(item)]
     else:

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -49,6 +50,19 @@ def real(name):
     if not path.is_file():
         pytest.skip("no real footage here")
     return path
+
+
+def full_disk(path, *_):
+    """Stands in for what writes a file."""
+    raise OSError(28, "No space left on device", str(path))
+
+
+def wait_for(condition):
+    """Poll until a condition holds; fail after a minute."""
+    deadline = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
 
 
 def trajectory(rng, n):

@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from helpers import full_disk
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
@@ -45,24 +46,17 @@ def here(folder, tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (None, "error: videos: no such video file, got 'bad.avi'"),
-        (b"no video", "error: videos: must be a video file that PyAV can read, got 'bad.avi'"),
-        (b"", "must be a video file, got the empty file 'bad.avi'"),
-        ("half", "bad.avi must hold the 210 frames that its header states, got"),
-    ],
-)
-def test_a_bad_file_gives_one_error_and_no_report(here, capsys, content, message):
+def test_a_bad_file_gives_one_error_and_no_report(here, capsys):
     whole = (here / "c.avi").read_bytes()
-    if content is not None:
-        (here / "bad.avi").write_bytes(whole[: len(whole) // 2] if content == "half" else content)
-    assert main(["discover", "a.avi", "b.avi", "bad.avi", "--rig", "rig.toml"]) == 2
-    (error,) = [line for line in capsys.readouterr().err.splitlines() if "error" in line]
-    assert message in error
-    assert not (here / "report").exists()
-    assert not list(here.glob(".report*"))
+    for content, message in (
+        (b"no video", "error: videos: must be a video file that PyAV can read, got 'bad.avi'"),
+        (whole[: len(whole) // 2], "bad.avi must hold the 210 frames that its header states, got"),
+    ):
+        (here / "bad.avi").write_bytes(content)
+        assert main(["discover", "a.avi", "b.avi", "bad.avi", "--rig", "rig.toml"]) == 2
+        (error,) = [line for line in capsys.readouterr().err.splitlines() if "error" in line]
+        assert message in error
+    assert not list(here.glob("*report*"))
 
 
 @pytest.mark.parametrize(
@@ -74,10 +68,6 @@ def test_a_bad_file_gives_one_error_and_no_report(here, capsys, content, message
         (["rig-import", "none.toml"], "files: no such calibration file, got 'none.toml'"),
         (["--rig", "none.toml"], "rig: no such file, got 'none.toml'"),
         (["--rig", "rig.toml", "--lag", "0,7"], "lag: must be 3 finite numbers"),
-        (
-            ["--rig", "rig.toml", "--lag=0,0,-210"],
-            "in common with the first (220 frames), got -210 for c.avi (210 frames)",
-        ),
         (["--rig", "rig.toml", "--fps", "0"], "fps: must be positive, got 0"),
         (["--rig", "rig.toml", "--lag", "0,soon,0"], "lag: must be numbers with commas between"),
         (["--rig", "a.avi"], "rig: must be a TOML file in UTF-8, got 'a.avi', which is none"),
@@ -99,9 +89,6 @@ def test_bad_commands_are_told_in_one_line_before_anything_is_tracked(
     assert shown.err.startswith("error: ")
     assert message in shown.err
     assert (shown.err.count("\n"), shown.out) == (1, "")
-
-
-# ------------------------------------------------------------------ tracks, refusals, interruptions
 
 
 @pytest.fixture
@@ -163,11 +150,6 @@ def test_a_refusal_has_one_line_and_a_picture(tracked, capsys):
         ([], "videos: give either one video per camera, or --tracks"),
         (["--tracks", "a.csv", "b.csv", "c.csv"], "t: must be given, or fps, as a.csv states no"),
         (["--tracks", "a.csv", "none.csv"], "tracks: no such file, got 'none.csv'"),
-        (["--tracks", "a.csv", "--fps", "9"], "tracks: must be one per camera, got 1 for 3"),
-        (
-            ["--tracks", "rig.toml", "--fps", "9"],
-            "tracks: must hold rows of numbers, got none, in 'rig.toml'",
-        ),
         (["--tracks", "1.csv", "1.csv", "1.csv", "--fps", "9"], "tracks: must have two frames or"),
     ],
 )
@@ -179,10 +161,7 @@ def test_bad_tracks_are_told(tracked, capsys, options, message):
 
 @pytest.mark.parametrize("degree", ["2", "7"])
 def test_a_full_disk_is_one_line_and_law_or_refusal_are_told(tracked, capsys, monkeypatch, degree):
-    def full(path, *_):
-        raise OSError(28, "No space left on device", str(path))
-
-    monkeypatch.setattr(Path, "write_bytes", full)
+    monkeypatch.setattr(Path, "write_bytes", full_disk)
     command = ["discover", "--rig", "rig.toml", "--fps", "25", "--degree", degree, "--tracks"]
     assert main([*command, "a.csv", "b.csv", "c.csv"]) == 2
     shown = capsys.readouterr()

@@ -1,7 +1,4 @@
-"""Files: whatever is wrong with one from outside is one line; they are replaced in one step.
-
-And where the repository is, the hash of its code, what has to be installed.
-"""
+"""Files: what is wrong with one is one line, each is replaced in one step; the hash of code."""
 
 import ast
 import json
@@ -11,6 +8,7 @@ from importlib.metadata import packages_distributions
 
 import numpy as np
 import pytest
+from helpers import full_disk
 
 import vidsindy_lite as vl
 from vidsindy_lite import storage
@@ -21,7 +19,6 @@ from vidsindy_lite.storage import (
     RESULTLESS,
     code_hash,
     read_tree,
-    repository_root,
     write_file,
 )
 from vidsindy_lite.vision import read_tracks
@@ -100,10 +97,7 @@ def test_a_full_disk_leaves_the_old_law_and_rig(saved, tmp_path, monkeypatch, ca
     rig.save(tmp_path / "rig.toml")
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
 
-    def full(path, *rest):
-        raise OSError(28, "No space left on device", str(path))
-
-    monkeypatch.setattr(f"pathlib.Path.{call}", full)
+    monkeypatch.setattr(f"pathlib.Path.{call}", full_disk)
     for save in (law.save, rig.save):
         for name in (*before, "new"):
             with pytest.raises(OSError, match="No space left"):
@@ -124,15 +118,6 @@ def test_a_link_stays_one_and_a_device_too(tmp_path):
     assert vl.Rig.load(tmp_path / "there.toml") == rig
     assert (tmp_path / "there.toml").stat().st_mode & 0o777 == 0o640
     rig.save("/dev/null")
-
-
-# ----------------------------------------------------------------------------------- the repository
-
-
-def test_repository_is_found_from_inside(tiny, tmp_path):
-    assert repository_root(tiny.notebooks) == tiny.root
-    with pytest.raises(FileNotFoundError, match="repository: expected to be inside a clone"):
-        repository_root(tmp_path.parent)
 
 
 PARTS = {
@@ -189,12 +174,8 @@ def imported(folder):
 
 def unlisted(modules, listed):
     """Modules of other distributions than those that are listed."""
-    homes = packages_distributions()
-    return {
-        module
-        for module in modules
-        if module in homes and not {_plain(name) for name in homes[module]} & listed
-    }
+    homes = {name: set(map(_plain, home)) for name, home in packages_distributions().items()}
+    return {module for module in modules & homes.keys() if not homes[module] & listed}
 
 
 def _plain(name):
@@ -211,8 +192,7 @@ def required():
 
 
 def test_all_that_is_imported_is_listed_in_both():
-    modules = imported("vidsindy_lite") | imported("tests") | imported("notebooks")
-    modules |= imported("docs")
+    modules = set().union(*map(imported, ("vidsindy_lite", "tests", "notebooks", "docs")))
     for listed in required():
         assert unlisted(modules, listed | {"vidsindy-lite"}) == set()
 

@@ -13,7 +13,10 @@ import pytest
 from vidsindy_lite.storage import PACKAGE
 
 ROOT = PACKAGE.parent
-WITHOUT = ("torch", "pysindy", "sklearn", "pandas", "seaborn", "joblib", "filelock", "papermill")
+WITHOUT = (
+    "torch", "pysindy", "sklearn", "pandas", "matplotlib", "seaborn", "joblib", "filelock",
+    "papermill",
+)  # fmt: skip
 HIDE = f"""\
 import sys
 

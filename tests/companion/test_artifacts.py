@@ -147,23 +147,17 @@ def test_without_a_run_results_go_to_a_folder_of_their_own(tiny, monkeypatch, ca
     assert capsys.readouterr().out.count(str(own)) == 1
 
 
-@pytest.fixture
-def complete(folder, figure):
-    """A folder with two tables, a figure and the index."""
+def test_index_shows_everything_in_order_and_is_the_same_bytes_twice(folder, figure):
     save_table("table_S10", ROWS, caption="Ten.")
     save_table("table_S2", ROWS, caption="Two.")
     save_figure("fig_2", figure, caption="A square.", numbers={})
     write_index(folder)
-    return folder
-
-
-def test_index_shows_everything_in_order_and_is_the_same_bytes_twice(complete):
-    page = (complete / "README.md").read_text()
+    page = (folder / "README.md").read_text()
     places = [page.index(f"### {name}\n") for name in ("fig_2", "table_S2", "table_S10")]
     assert places == sorted(places)
     assert "![fig_2](fig_2.png)\n\nA square." in page
     assert "| [01_first](../notebooks/01_first.ipynb) | [fig_2](#fig_2)" in page
     assert re.search(r"\| Lorenz +\| +12 \| +0.001235 \| +yes \| +2.3 \|", page)
-    before = contents(complete)
-    write_index(complete)
-    assert contents(complete) == before
+    before = contents(folder)
+    write_index(folder)
+    assert contents(folder) == before

@@ -136,9 +136,7 @@ def test_what_a_notebook_makes_no_longer_goes_and_others_things_stay(folders):
     (folders[1] / "fig_1.json").unlink()
     assert refresh(*folders, "01_first") == ["fig_1"]
     assert set(files(folders[0])) == {"table_1.json", "other.json"}
-
-
-def test_two_notebooks_cannot_make_one_id(folders):
+    write(folders[1], FIGURE)
     write(folders[1], rows(l2=2.0))
     write(folders[0], FIGURE | {"notebook": "02_second"})
     before = files(folders[0])

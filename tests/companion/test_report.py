@@ -9,8 +9,8 @@ import subprocess
 import sys
 import tomllib
 import warnings
+from collections import Counter
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 
 import av
@@ -18,7 +18,8 @@ import jsonschema
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from browser import CHROMIUM, Browser
+from browser import Browser, needs_browser
+from helpers import full_disk
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
@@ -36,8 +37,6 @@ from vidsindy_lite.companion.report import (
 )
 from vidsindy_lite.pipeline import Observation, Refused
 from vidsindy_lite.vision import read_tracks
-
-needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here to open the page in")
 
 
 @pytest.fixture(scope="module")
@@ -69,30 +68,18 @@ def page(case, tmp_path_factory):
     return write_report(found, paths, folder, {"degree": 2})
 
 
-class Parser(HTMLParser):
-    """Collects addresses, and checks that what is opened is closed."""
-
-    def __init__(self):
-        super().__init__()
-        self.open, self.addresses, self.images = [], [], 0
-
-    def handle_starttag(self, tag, attributes):
-        self.addresses += [value for key, value in attributes if key in ("src", "href")]
-        self.images += tag == "img"
-        if tag not in ("meta", "img"):
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
+def checked_page(page):
+    """The text of a page, in which what is opened is closed, and the addresses that it names."""
+    text = page.read_text("utf-8")
+    opened = Counter(re.findall(r"<([a-z]\w*)", text))
+    assert opened - Counter({"meta": 99, "img": 99}) == Counter(re.findall(r"</(\w+)>", text))
+    return text, re.findall(r'(?:src|href)="([^"]*)"', text)
 
 
 def test_the_page_tells_law_verdict_and_cameras_and_needs_nothing_else(page, case):
-    parser = Parser()
-    text = page.read_text(encoding="utf-8")
-    parser.feed(text)
-    assert parser.open == []
-    assert parser.images == 5
-    kinds = [address.partition(",")[0] for address in parser.addresses]
+    text, addresses = checked_page(page)
+    assert text.count("<img") == 5
+    kinds = [address.partition(",")[0] for address in addresses]
     assert sorted(set(kinds)) == ["data:image/png;base64", "data:video/webm;base64"]
     assert kinds.count("data:video/webm;base64") == 1
     assert not re.search(r"https?:|@import|<script|<link", text)
@@ -108,13 +95,10 @@ def test_the_page_tells_law_verdict_and_cameras_and_needs_nothing_else(page, cas
     assert "degree 2" in text
 
 
-def test_the_data_are_those_of_the_law(page, case):
-    found, _ = case
-
-    def refuse(constant):
-        raise AssertionError(f"{constant} is not JSON")
-
-    data = json.loads((page.parent / "result.json").read_text("utf-8"), parse_constant=refuse)
+def test_the_data_are_those_of_the_law_and_the_tracks_can_be_read_again(page, case):
+    found, data = case[0], checked(page.parent)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(data | {"status": "sure"}, described())
     assert data["status"] == found.status
     assert data["law"]["native"]["equations"] == found.discovery.equations("native")
     term = data["law"]["data"]["terms"][0]
@@ -130,6 +114,10 @@ def test_the_data_are_those_of_the_law(page, case):
     assert data["cameras"][1]["share_of_frames_seen"] == pytest.approx(140 / 150)
     assert vl.Rig.load(page.parent / "rig.toml") == found.rig
     assert {path.name for path in page.parent.iterdir()} == set(FILES)
+    tracks = read_tracks(page.parent / "tracks.csv")
+    for ours, theirs in zip(tracks, found.tracks, strict=True):
+        np.testing.assert_allclose(ours.pixels, theirs, rtol=1e-9)
+        np.testing.assert_allclose(ours.t, found.t, rtol=1e-9, atol=1e-9)
 
 
 OLD = "<title>Law of a moving target</title> old"
@@ -137,10 +125,7 @@ OLD = "<title>Law of a moving target</title> old"
 
 @pytest.fixture
 def old(tmp_path, monkeypatch):
-    """A folder with an earlier report, as a link to where it is, and a file of somebody's.
-
-    Without pictures: it is for tests of the files.
-    """
+    """A link to a folder with an earlier report and a file of somebody's; without pictures."""
     monkeypatch.setattr(report, "_figures", lambda *_: iter(()))
     (tmp_path / "there").mkdir()
     (tmp_path / "report").symlink_to(tmp_path / "there")
@@ -161,13 +146,10 @@ def test_an_earlier_report_is_replaced_and_nothing_else(case, old):
 
 @pytest.mark.parametrize("call", ["write_bytes", "replace", None])
 def test_a_report_that_fails_leaves_what_was_there(case, old, tmp_path, monkeypatch, call):
-    def full(path, *rest):
-        raise OSError(28, "No space left on device", str(path))
-
     found, paths = case
     with monkeypatch.context() as patch:
         if call:
-            patch.setattr(Path, call, full)
+            patch.setattr(Path, call, full_disk)
         for folder in (old, tmp_path / "new"):
             with pytest.raises(OSError, match="No space left on device|gone"):
                 write_report(found, None if call else [*paths[:2], old / "gone.mov"], folder)
@@ -225,8 +207,12 @@ def described():
 
 def checked(folder):
     """result.json, which the schema must describe, all of it."""
+
+    def refuse(constant):
+        raise AssertionError(f"{constant} is not JSON")
+
     schema = described()
-    data = json.loads((folder / "result.json").read_text("utf-8"))
+    data = json.loads((folder / "result.json").read_text("utf-8"), parse_constant=refuse)
     jsonschema.validate(data, schema)
     told = next(
         one for one in schema["oneOf"] if jsonschema.Draft202012Validator(one).is_valid(data)
@@ -236,7 +222,6 @@ def checked(folder):
 
 
 def test_of_tracks_alone_a_doubted_law_in_turned_axes(case, tmp_path, monkeypatch):
-    """Written where one works; its curve is in the axes of the rig."""
     found, _ = case
     turn = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
     turned = replace(found.discovery, orientation=turn)
@@ -256,16 +241,6 @@ def test_of_tracks_alone_a_doubted_law_in_turned_axes(case, tmp_path, monkeypatc
     assert "<td>camera 2</td>" in page
 
 
-def test_the_schema_describes_the_data_and_the_tracks_can_be_read_again(page, case):
-    data = checked(page.parent)
-    with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(data | {"status": "sure"}, described())
-    tracks = read_tracks(page.parent / "tracks.csv")
-    for ours, theirs in zip(tracks, case[0].tracks, strict=True):
-        np.testing.assert_allclose(ours.pixels, theirs, rtol=1e-9)
-        np.testing.assert_allclose(ours.t, case[0].t, rtol=1e-9, atol=1e-9)
-
-
 @pytest.mark.parametrize("with_videos", [True, False])
 def test_a_refusal_shows_the_tracks_and_the_step(case, tmp_path, with_videos):
     found, paths = case
@@ -277,9 +252,8 @@ def test_a_refusal_shows_the_tracks_and_the_step(case, tmp_path, with_videos):
     assert {path.name for path in page.parent.iterdir()} == {
         "report.html", "result.json", "tracks.csv",
     }  # fmt: skip
-    parser, text = Parser(), page.read_text("utf-8")
-    parser.feed(text)
-    assert (parser.open, parser.images) == ([], 1)
+    text, _ = checked_page(page)
+    assert text.count("<img") == 1
     assert "A target was not found in every video." in text
     assert "paths: &lt;b&gt; shows nothing" in text
     data = checked(page.parent)
@@ -289,7 +263,7 @@ def test_a_refusal_shows_the_tracks_and_the_step(case, tmp_path, with_videos):
     np.testing.assert_allclose(read_tracks(page.parent / "tracks.csv")[0].pixels, tracks[0])
 
 
-@needs_chromium
+@needs_browser
 def test_a_telephone_shows_the_report_without_scrolling_sideways(page, case, tmp_path):
     found, paths = case
     tracks = [track[:20] for track in found.tracks]
@@ -302,8 +276,6 @@ def test_a_telephone_shows_the_report_without_scrolling_sideways(page, case, tmp
             assert seen["width"] <= 390
             assert (seen["errors"], seen["requests"], seen["broken"]) == ([], [], [])
 
-
-# -------------------------------------------------- the film of the law, and the page of pick
 
 LATER = 4  # frames
 
@@ -329,7 +301,7 @@ def decoded(film):
         return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
 
-def test_the_law_is_drawn_where_the_target_is(tmp_path):
+def test_the_law_is_drawn_where_the_target_is_and_a_long_film_shown_in_steps(tmp_path):
     found, paths = observed(tmp_path, 150)
     frames = decoded(law_over_videos(found, paths))
     assert len(frames) == 150
@@ -342,9 +314,6 @@ def test_the_law_is_drawn_where_the_target_is(tmp_path):
             ring = found.rig.cameras[i].project(found.x[[k]])[0]
             assert np.hypot(u - ring[0], v - ring[1]).min() < 10
     assert len(law_over_videos(found, paths)) < 1_000_000
-
-
-def test_a_long_film_is_shown_in_steps(tmp_path):
     found, paths = observed(tmp_path, 201)
     assert len(decoded(law_over_videos(found, paths))) == 101
 
@@ -367,24 +336,20 @@ def test_one_page_holds_all(videos, tmp_path):
     assert (numbers[0], numbers[FRAMES - 1]) == (0, 59)
 
 
-def test_only_its_own_pages_are_replaced(videos, tmp_path):
+def test_only_its_own_pages_are_replaced_by_the_command_too(videos, tmp_path, monkeypatch, capsys):
     out = tmp_path / "pick.html"
     write_pick_page(videos[:1], out)
-    write_pick_page(videos, out)
+    monkeypatch.chdir(tmp_path)
+    assert main(["pick", *map(str, videos)]) == 0
+    assert capsys.readouterr().out == "open pick.html in a browser\n"
+    assert main(["pick", "none.mp4"]) == 2
+    assert "no such video file" in capsys.readouterr().err
     other = tmp_path / "thesis.html"
     other.write_text("mine")
     for place in (other, tmp_path):
         with pytest.raises(ValueError, match="out: must be a new file or an earlier page of pick"):
             write_pick_page(videos, place)
     assert other.read_text() == "mine"
-
-
-def test_the_command(videos, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["pick", *map(str, videos)]) == 0
-    assert capsys.readouterr().out == "open pick.html in a browser\n"
-    assert main(["pick", "none.mp4"]) == 2
-    assert "no such video file" in capsys.readouterr().err
 
 
 DRAG = """(() => {
@@ -402,7 +367,7 @@ DRAG = """(() => {
 })()"""
 
 
-@needs_chromium
+@needs_browser
 @pytest.mark.parametrize(("width", "drawn"), [(390, "box"), (1280, "click")])
 def test_a_box_becomes_the_line_to_paste(videos, tmp_path, width, drawn):
     page = write_pick_page(videos, tmp_path / "pick.html")

@@ -1,19 +1,17 @@
 """The runner on tiny notebooks: what it makes of a good one, how each bad one is seen to fail."""
 
-import errno
 import os
 import re
 import shutil
 import subprocess
 import sys
-import time
 from functools import cache
 
 import jupytext
 import nbformat
 import psutil
 import pytest
-from helpers import TinyRepository
+from helpers import TinyRepository, full_disk, wait_for
 
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.companion import run as runner
@@ -117,10 +115,6 @@ def test_full_run_writes_into_the_repository(executed_once):
     assert "| full" in cleaned.cells[3].outputs[0].data["text/markdown"]
 
 
-def full(path, content):
-    raise OSError(errno.ENOSPC, "No space left on device")
-
-
 def test_what_differs_is_refreshed_and_nothing_else_though_a_disk_was_full(
     good, no_kernel, monkeypatch
 ):
@@ -129,7 +123,7 @@ def test_what_differs_is_refreshed_and_nothing_else_though_a_disk_was_full(
     record.write_text(record.read_text().replace("1.0", "1.01"))
     for module in ("compare", "run"):
         with monkeypatch.context() as patch:
-            patch.setattr(f"vidsindy_lite.companion.{module}.write_file", full)
+            patch.setattr(f"vidsindy_lite.companion.{module}.write_file", full_disk)
             (outcome,) = run(root=good.root)
         assert "No space left on device" in outcome.error
     (outcome,) = run(root=good.root)
@@ -204,14 +198,6 @@ def test_an_edit_meanwhile_is_not_taken_for_a_run_of_this_code(good, instant, mo
     assert executed(run(root=good.root)) == ["01_first"]
 
 
-def wait_for(condition):
-    """Poll until a condition holds; fail after a minute."""
-    deadline = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
-
-
 def start(tiny):
     command = [sys.executable, "-m", "vidsindy_lite", "run"]
     here = os.environ | {"PYTHONPATH": str(PACKAGE.parent)}
@@ -243,20 +229,17 @@ def test_a_run_that_is_killed_leaves_no_process_and_goes_on_later(good, no_kerne
     assert not (good.root / "build" / "runs" / "02_long-full" / "running").exists()
 
 
-@pytest.mark.parametrize(
-    ("names", "chosen"),
-    [
+def test_names_of_notebooks(tiny):
+    for name in ("01_first", "02_second", "02_twin"):
+        tiny.write(name)
+    for names, chosen in (
         ([], ["01_first", "02_second", "02_twin"]),
         (["01"], ["01_first"]),
         (["02_second", "01_first"], ["01_first", "02_second"]),
         (["02"], ["02_second", "02_twin"]),
         (["notebooks/02_twin.ipynb", "elsewhere/01_first.py"], ["01_first", "02_twin"]),
-    ],
-)
-def test_names_of_notebooks(tiny, names, chosen):
-    for name in ("01_first", "02_second", "02_twin"):
-        tiny.write(name)
-    assert [path.stem for path in select_notebooks(names, tiny.root)] == chosen
+    ):
+        assert [path.stem for path in select_notebooks(names, tiny.root)] == chosen
 
 
 def test_what_makes_no_sense_is_refused(tiny, tmp_path, monkeypatch, capsys):

@@ -73,29 +73,26 @@ def test_a_claim_is_listed_with_its_checks(page):
 
 
 @pytest.mark.parametrize(
-    ("old", "new"),
+    ("old", "new", "message"),
     [
-        ("#   <!-- by: one + one == 2; figure sum; docs/page.md; 02: two > 1 -->\n", ""),
-        ("by: one + one == 2", "by: one + one == 3"),
-        ("    one + one == 2\n", "    one + one == 3\n"),
-        ("figure sum", "figure product"),
-        ("docs/page.md", "docs/other.md"),
-        ("02: two > 1", "02: two > 2"),
-        ("::test_one", "::test_two"),
+        (
+            "#   <!-- by: one + one == 2; figure sum; docs/page.md; 02: two > 1 -->\n",
+            "",
+            "no check",
+        ),
+        ("by: one + one == 2", "by: one + one == 3", "no assertion"),
+        ("    one + one == 2\n", "    one + one == 3\n", "no assertion"),
+        ("figure sum", "figure product", "no assertion"),
+        ("docs/page.md", "docs/other.md", "no assertion"),
+        ("02: two > 1", "02: two > 2", "no assertion"),
+        ("::test_one", "::test_two", "no assertion"),
+        ("one + one == 2; figure sum; docs/page.md; 02: two > 1", "figure sum", "nothing could"),
     ],
 )
-def test_a_claim_without_a_check_is_seen(page, old, new):
+def test_a_claim_without_a_check_is_seen(page, old, new, message):
     assert old in CELLS
     page.write_text(CELLS.replace(old, new, 1))
-    with pytest.raises(ValueError, match=r"01_one.py: no (check|assertion)"):
-        claims_of(page)
-
-
-def test_a_claim_that_nothing_could_make_false_is_seen(page):
-    page.write_text(
-        CELLS.replace("one + one == 2; figure sum; docs/page.md; 02: two > 1", "figure sum")
-    )
-    with pytest.raises(ValueError, match=r"01_one.py: nothing could make it false: 'One and one"):
+    with pytest.raises(ValueError, match=f"01_one.py: {message}"):
         claims_of(page)
 
 

@@ -9,16 +9,13 @@ from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import pytest
-from browser import CHROMIUM, Browser
+from browser import Browser, needs_browser
 
 from vidsindy_lite.companion.artifacts import save_slider
 from vidsindy_lite.storage import PACKAGE
 
 ROOT = PACKAGE.parent
 LAPTOP, PHONE = 1280, 390  # CSS pixels
-needs_browser = pytest.mark.skipif(
-    CHROMIUM is None, reason="no Chromium here to open the pages in: apt-get install chromium"
-)
 
 
 @pytest.fixture(scope="module")
@@ -40,12 +37,6 @@ def site(built):
 
 
 @pytest.fixture(scope="module")
-def conf():
-    """What makes the site, as a module."""
-    return SimpleNamespace(**runpy.run_path(str(ROOT / "docs" / "conf.py")))
-
-
-@pytest.fixture(scope="module")
 def browser(tmp_path_factory):
     with Browser(tmp_path_factory.mktemp("profile")) as browser:
         yield browser
@@ -54,13 +45,12 @@ def browser(tmp_path_factory):
 def page_problems(browser, page, width):
     """What a reader would miss on a page, or have to scroll sideways for."""
     seen = browser.open(page, width)
-    problems = [f"broken image {image}" for image in seen["broken"]]
-    problems += [f"image without words {image}" for image in seen["wordless"]]
-    problems += [f"code wider than its box: {code}" for code in seen["cut"]]
-    problems += [f"console: {error}" for error in seen["errors"]]
-    problems += [f"asks the network for {url}" for url in seen["requests"]]
-    problems += [f"link to no place on the page: #{anchor}" for anchor in seen["dead"]]
-    problems += [f"formula: {formula}" for formula in seen["unread"]]
+    words = {
+        "broken": "broken image ", "wordless": "image without words ", "errors": "console: ",
+        "cut": "code wider than its box: ", "requests": "asks the network for ",
+        "dead": "link to no place on the page: #", "unread": "formula: ",
+    }  # fmt: skip
+    problems = [f"{said}{one}" for kind, said in words.items() for one in seen[kind]]
     if not seen["text"].strip():
         problems.append("shows no text")
     if seen["width"] > width:
@@ -89,20 +79,11 @@ def test_every_page_can_be_read(site, browser, width):
     assert {page: problems for page, problems in found.items() if problems} == {}
 
 
-@pytest.mark.slow
-@needs_browser
-def test_formulas_and_figures_are_drawn(site, browser):
-    seen = browser.open(site / "notebooks" / "03_camera_learning.html")
-    assert seen["formulas"] > 10
-    executed = (ROOT / "notebooks" / "03_camera_learning.ipynb").read_text("utf-8")
-    assert seen["images"] == executed.count('"image/png":') + executed.count("<img ") >= 5
-    assert r"\mathbf" not in seen["text"]
-
-
 @pytest.mark.parametrize(
     "origin", ["https://github.com/some-one/film.law.git\n", "git@github.com:some-one/film.law.git"]
 )
-def test_a_notebook_of_a_repository_on_github_opens_on_binder_and_colab(conf, origin):
+def test_a_notebook_of_a_repository_on_github_opens_on_binder_and_colab(origin):
+    conf = SimpleNamespace(**runpy.run_path(str(ROOT / "docs" / "conf.py")))
     for elsewhere in ("", "/home/me/film", "https://example.org/github.com.git"):
         assert conf.launchers("notebooks/01_projection_proofs", elsewhere) == ""
     told = conf.launchers("notebooks/01_projection_proofs", origin)
@@ -175,8 +156,12 @@ def test_nothing_is_warned_of_every_link_leads_to_a_file_and_every_module_has_a_
 
 @pytest.mark.slow
 @needs_browser
-def test_pages_lead_to_each_other_and_words_to_pages(site, browser):
-    browser.open(site / "notebooks" / "03_camera_learning.html")
+def test_a_page_draws_its_formulas_and_figures_and_leads_to_others(site, browser):
+    seen = browser.open(site / "notebooks" / "03_camera_learning.html")
+    assert seen["formulas"] > 10
+    executed = (ROOT / "notebooks" / "03_camera_learning.ipynb").read_text("utf-8")
+    assert seen["images"] == executed.count('"image/png":') + executed.count("<img ") >= 5
+    assert r"\mathbf" not in seen["text"]
     for selector, end in (
         ("a.prev-page", "02_videos_and_tracking.html"),
         ("a.next-page", "04_spline_ado.html"),

@@ -63,9 +63,6 @@ def test_fibers_share_the_rate(n, rate, seed):
     assert lengths.max() - lengths.min() <= 1
 
 
-# ------------------------------------------------------------- errors that are no white noise
-
-
 def waves(n=4000):
     """A smooth path of three coordinates with other means and spreads."""
     t = np.linspace(0, 40 * np.pi, n)

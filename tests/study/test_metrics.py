@@ -82,9 +82,6 @@ def test_what_cannot_be_compared_is_refused(compare, one, other, message):
         compare(one, other)
 
 
-# ----------------------------------------------------------------------------- the Cramer-Rao bound
-
-
 def test_an_unknown_origin_agrees_with_its_closed_form():
     """x = c + a exp(-k t) around an unknown c."""
     t = np.linspace(0, 3, 60)

@@ -94,23 +94,6 @@ def test_the_oracle_follows_the_clean_path_at_least_as_closely_as_its_candidates
         assert oracle.r2 >= max(plain.r2, smooth.r2)
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: FlowContest("Lorentz", "drift 0.2 %"), "flow: must be one of .* got 'Lorentz'"),
-        (lambda: FlowContest("Lorenz", "noise"), "error: must be one of .* got 'noise'"),
-        (lambda: run_contest(LorenzContest(4, 0.1, methods=("guess",))), "methods: must be one of"),
-        (lambda: Ablation(LorenzContest(4, 0.1), "luck"), "without: must be"),
-    ],
-)
-def test_bad_contests_are_refused(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()
-
-
-# ---------------------------------------------------------------------------------- the ablation
-
-
 @pytest.mark.parametrize("without", WITHOUT)
 def test_what_is_replaced_is_there_and_comes_back(monkeypatch, without):
     def current():
@@ -136,19 +119,12 @@ def test_the_table_of_the_ablation_counts_what_is_lost_and_gained():
     assert table.loc["path"].tolist() == [2, 1, 1, 1, 1, 4.0]
 
 
-# -------------------------------------------------------------------------- what is published
-
-
 @pytest.mark.parametrize("name", SYSTEMS)
-def test_table_s1_is_what_the_package_simulates(name):
+def test_tables_s1_and_s2_are_of_what_the_package_simulates(name):
     published, system = SYSTEMS_S1[name], SYSTEMS[name]
     assert published.x0 == system.x0
     assert score(published.law, system).l2 == 0
-
-
-@pytest.mark.parametrize("name", SYSTEMS)
-def test_the_ground_truths_of_table_s2_are_the_shifted_systems(name):
-    result = score(LAWS["Ground truth", name], SYSTEMS[name].shift(REFERENCE_OFFSET))
+    result = score(LAWS["Ground truth", name], system.shift(REFERENCE_OFFSET))
     assert result.exact
     printed = 2e-4 if name == "Lorenz" else 1e-14  # 2.667 for 8/3, the only rounded number
     assert result.max_coefficient_error < printed
@@ -165,18 +141,25 @@ def test_a_system_that_there_is_not_is_told_with_those_that_there_are(systems, c
     assert len(systems) == len({**systems}) == count
 
 
+LORENZ = SYSTEMS["Lorenz"]
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda law: replace(law, period=0), "period: must be positive"),
-        (lambda law: replace(law, x0=(1, 2)), "x0: must be 3 finite numbers"),
-        (lambda law: law.times(0), "n: must be an integer of at least 1, got 0"),
-        (lambda law: law.trajectory(5, -1), "samples_per_period: must be positive, got -1"),
+        (lambda: FlowContest("Lorentz", "drift 0.2 %"), "flow: must be one of .* got 'Lorentz'"),
+        (lambda: FlowContest("Lorenz", "noise"), "error: must be one of .* got 'noise'"),
+        (lambda: run_contest(LorenzContest(4, 0.1, methods=("guess",))), "methods: must be one of"),
+        (lambda: Ablation(LorenzContest(4, 0.1), "luck"), "without: must be"),
+        (lambda: replace(LORENZ, period=0), "period: must be positive"),
+        (lambda: replace(LORENZ, x0=(1, 2)), "x0: must be 3 finite numbers"),
+        (lambda: LORENZ.times(0), "n: must be an integer of at least 1, got 0"),
+        (lambda: LORENZ.trajectory(5, -1), "samples_per_period: must be positive, got -1"),
     ],
 )
-def test_bad_benchmarks_and_times_are_refused(make, message):
+def test_bad_contests_benchmarks_and_times_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
-        make(SYSTEMS["Lorenz"])
+        make()
 
 
 def allee(x):

@@ -1,6 +1,5 @@
 """Sweeps in small clones of the repository: killed, edited, damaged, on a cluster."""
 
-import errno
 import hashlib
 import json
 import math
@@ -8,11 +7,11 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from helpers import full_disk, wait_for
 
 from vidsindy_lite.storage import PACKAGE
 from vidsindy_lite.study.sweeps import remember, sweep
@@ -69,29 +68,24 @@ class Clone:
     def __init__(self, root):
         self.root, self.calls = root, root / "calls.txt"
         self.package = root / "vidsindy_lite"
-        self.package.mkdir()
         (root / "notebooks").mkdir()
+        for room in ("study", "companion"):
+            (self.package / room).mkdir(parents=True)
         (root / "sweep.py").write_text(SWEEP)
-        (self.package / "study").mkdir()
+        files = {"CALLS": str(self.calls), "THREADS": str(root / "threads.txt")}
+        self.environment = os.environ | {"PYTHONPATH": str(root)} | files
         for front_door in (self.package, self.package / "study"):
             (front_door / "__init__.py").touch()
         (self.package / "toy.py").write_text(TOY)
         (self.package / "powers.py").write_text("def square(number):\n    return number**2\n")
-        (self.package / "companion").mkdir()
         (self.package / "companion" / "pages.py").write_text("LINE_WIDTH = 1\n")
-        used = ("arrays.py", "checks.py", "storage.py", "values.py", "study/sweeps.py")
-        for module in used:
+        for module in ("arrays.py", "checks.py", "storage.py", "values.py", "study/sweeps.py"):
             (self.package / module).write_bytes((PACKAGE / module).read_bytes())
 
     def edit(self, module, old, new):
         path = self.package / module
         assert old in path.read_text()
         path.write_text(path.read_text().replace(old, new))
-
-    @property
-    def environment(self):
-        files = {"CALLS": str(self.calls), "THREADS": str(self.root / "threads.txt")}
-        return os.environ | {"PYTHONPATH": str(self.root)} | files
 
     def start(self, tasks, jobs=2, **environment):
         """A process that sweeps over tasks, each a list of a number and a pause in seconds."""
@@ -102,19 +96,13 @@ class Clone:
             text=True, start_new_session=True,
         )  # fmt: skip
 
-    def sweep(self, tasks, **environment):
-        """Results of a sweep to its end."""
+    def sweep(self, tasks, status=0, **environment):
+        """Results of a sweep to its end, or what it raises."""
         process = self.start(tasks, **environment)
         output, errors = process.communicate(timeout=120)
-        assert process.returncode == 0, errors
-        return json.loads(output)
-
-    def fail(self, tasks, **environment):
-        """What a sweep that fails raises; what its workers leave behind may be told after it."""
-        process = self.start(tasks, **environment)
-        _, errors = process.communicate(timeout=120)
-        assert process.returncode == 1
-        return [line for line in errors.splitlines() if "Error: " in line][-1]
+        assert process.returncode == status, errors
+        raised = [line for line in errors.splitlines() if "Error: " in line]
+        return raised[-1] if status else json.loads(output)
 
     def called(self):
         """Numbers of the tasks that were computed since the last start."""
@@ -145,17 +133,6 @@ def results_of(tasks):
     return [
         [number**2, np.random.default_rng(number).normal(size=3).tolist()] for number, _ in tasks
     ]
-
-
-def wait_for(condition):
-    """Poll until a condition holds; fail after a minute."""
-    deadline = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-
-
-# ------------------------------------------------------------------------------------- what is kept
 
 
 @pytest.mark.slow
@@ -214,7 +191,6 @@ def test_what_is_stored_is_found_unless_it_is_damaged_or_of_other_code(clone):
     ids=range(4),
 )
 def test_a_planted_file_is_read_and_never_executed(cache, monkeypatch, result):
-    """Its digest is right, but it is no result."""
     monkeypatch.chdir(cache)
     assert remember(squared, Holder(3)) == 9
     (file,) = cache.rglob("*.json")
@@ -225,8 +201,6 @@ def test_a_planted_file_is_read_and_never_executed(cache, monkeypatch, result):
     assert remember(squared, Holder(3)) == 9
     assert not (cache / "planted").exists()
 
-
-# --------------------------------------------------------------------------------------- a cluster
 
 CLUSTER = """\
 import sys
@@ -261,16 +235,13 @@ def test_a_cluster_gives_the_same_results_and_only_with_the_same_code(clone, clu
     assert clone.sweep(tasks, VIDSINDY_DASK=cluster) == results_of(tasks)
     assert clone.called() == [1, 2, 3]
     assert set(clone.stored()) == {1, 2, 3}
-    error = clone.fail([[5, 0.0], [-3, 1.0]], VIDSINDY_DASK=cluster)
+    error = clone.sweep([[5, 0.0], [-3, 1.0]], 1, VIDSINDY_DASK=cluster)
     assert error.endswith("square(Task(number=-3, pause=1.0)) raised ArithmeticError: below zero")
     assert 5 in clone.stored()
     clone.edit("powers.py", "number**2", "number * number")
-    error = clone.fail([[1, 0.0]], VIDSINDY_DASK=cluster)
+    error = clone.sweep([[1, 0.0]], 1, VIDSINDY_DASK=cluster)
     assert "all workers must have this very code of vidsindy_lite, got other code on tcp" in error
     assert clone.called() == []
-
-
-# ---------------------------------------------------------------------------------------- bad input
 
 
 @pytest.fixture
@@ -326,10 +297,7 @@ def test_one_task_is_remembered_by_whoever_asks_next(cache):
 
 
 def test_a_full_disk_costs_the_storing_not_the_result(cache, monkeypatch):
-    def full(path, content):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr("vidsindy_lite.study.sweeps.write_file", full)
+    monkeypatch.setattr("vidsindy_lite.study.sweeps.write_file", full_disk)
     with pytest.warns(UserWarning, match="a result is not stored: .*No space left"):
         assert remember(squared, Holder(3)) == 9
 
@@ -339,10 +307,3 @@ def squared(task):
 
 
 squared.__module__ = "vidsindy_lite.toy"
-
-
-def test_the_study_is_imported_without_what_only_parts_of_it_need():
-    heavy = ("torch", "pysindy", "sklearn", "pandas", "matplotlib", "seaborn", "joblib")
-    code = f"import sys, vidsindy_lite.study; print([m for m in {heavy} if m in sys.modules])"
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert ran.stdout.strip() == "[]"

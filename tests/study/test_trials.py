@@ -40,9 +40,6 @@ def filmed():
     return run_film(FilmTask("SprottE", 1, 150))
 
 
-# ------------------------------------------------------------------------------------------ films
-
-
 @pytest.fixture
 def this_film(filmed, monkeypatch):
     monkeypatch.setattr(experiments, "film_result", lambda task: filmed)
@@ -132,9 +129,6 @@ def test_doubts_of_the_observation_are_doubts_of_the_trial(this_film, monkeypatc
     assert run_trial(replace(trial, method="PySINDy")).status is None
 
 
-# ----------------------------------------------------------------------------------- what is random
-
-
 def test_data_depend_on_system_condition_level_and_number_alone():
     x = SYSTEMS["Lorenz"].trajectory(FRAMES)[1]
     trial = Trial("Lorenz", "noise", 0.1, 3, frames=FRAMES)
@@ -166,9 +160,6 @@ def test_every_method_gets_the_same_data_and_the_number_as_its_seed(this_film, m
         assert seed == 1
 
 
-# ----------------------------------------------------------------------------------------- results
-
-
 def test_result_of_gauss_newton_equals_a_direct_computation(this_film):
     trial = Trial("SprottE", "noise", 0.02, 2, source="truth", frames=FRAMES)
     truth = SYSTEMS["SprottE"].shift(REFERENCE_OFFSET)
@@ -183,9 +174,6 @@ def test_result_of_gauss_newton_equals_a_direct_computation(this_film):
     assert result.verdict == f"{'exact' if direct.exact else 'wrong'}, {found.status}"
     assert result.seconds > 0
     assert len(result.pulls) == truth.support.sum() - direct.missing
-
-
-# ------------------------------------------------------------------------------------ many of them
 
 
 def test_grid_is_every_combination_once_and_zero_is_clean():
