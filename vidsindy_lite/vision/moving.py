@@ -44,7 +44,6 @@ from .candidates import (
     Hint,
     Looks,
     Motion,
-    as_written,
     best_path,
     candidates,
     followed,
@@ -161,7 +160,7 @@ def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
             seed = boxed and _tightened(seen, boxed)
         paths = _paths(seen, hint, seed)
         if not paths and seed is None:
-            return nothing(film.motion, n, hint)
+            return nothing(film.motion, n)
         rows = paths[0].rows if paths else np.zeros(0, int)
         rims = boxes is None or len(rows) < n / 2
         covered = _covering(seen, rows, n, seed, rims=rims)
@@ -171,7 +170,7 @@ def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
             break
         boxes = covered
     if seed is None and boxes is not None and _turns_only(seen, rows):
-        return nothing(film.motion, n, hint)
+        return nothing(film.motion, n)
     start = seed or _plainest(seen, rows)
     near = rows[np.abs(seen.frame[rows] - start[0]) <= 2]
     pace = np.polyfit(seen.frame[near], seen.place[near], 1)[0] if len(near) > 1 else np.zeros(2)
@@ -179,7 +178,7 @@ def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
     both = _together(seen, looks, film.maps, start[0], told=seed is not None)
     rows, _ = best_path(both)
     if len(rows) < _SHORTEST:
-        return nothing(film.motion, n, hint)
+        return nothing(film.motion, n)
     doubts = _doubts(film, seen, paths, hint)
     if _differing(seen, both.only(rows)) < 0.5:
         doubts += (_LOOKS_ALONE,)
@@ -369,11 +368,9 @@ def viewed(film: Film, lens: Lens, ways: Ways, lights: list[Floats32]) -> list[V
     ]
 
 
-def nothing(motion: CameraMotion, n: int, hint: Hint | None = None) -> Track:
+def nothing(motion: CameraMotion, n: int) -> Track:
     """Of a film of n frames in which no target was found."""
     none = "nothing was found that moves like one target"
-    if hint is not None and hint.colour is not None:
-        none += f" and has the colour {as_written(hint.colour)}"
     return _as_track(np.full((n, 2), np.nan), np.full(n, np.inf), motion, (none,))
 
 

@@ -31,7 +31,7 @@ import numpy as np
 from ..arrays import Floats, Floats32, Image
 from ..checks import MALFORMED, check_instance, check_path, shown
 from .background import LONGEST, BackgroundModel, sample_frames, whole_blobs
-from .candidates import Candidates, Hint, best_path
+from .candidates import Candidates, Hint, as_written, best_path
 from .moving import Track, follow
 from .refining import scatter
 from .video import Reel, read_video, video_info
@@ -95,6 +95,8 @@ def track(
             raise ValueError(f"target: may be given for detector='auto', got {shown(detector)}")
     found = _track(path, detector, target)
     lacking, stated = found.warnings + _lost(found), video_info(path).frames
+    if target is not None and target.colour is not None and not _seen(found):
+        lacking += (f"nothing was found of the colour {as_written(target.colour)} as told",)
     if len(found.pixels) != stated:
         lacking += (f"{len(found.pixels)} of its {stated} frames can be read: it is cut off",)
     doubts = tuple(f"{Path(path).name}: {doubt}" for doubt in lacking)
