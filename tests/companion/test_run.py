@@ -1,5 +1,6 @@
 """The runner on tiny notebooks: what it makes of a good one, how each bad one is seen to fail."""
 
+import json
 import os
 import re
 import shutil
@@ -159,6 +160,21 @@ def test_quick_run_goes_to_the_build_folder_only(good, monkeypatch, capsys):
     assert {"notebooks/02_second.ipynb", "figures/README.md"} < set(made)
     assert b'"quick"' in made["figures/table_1.json"]
     assert outputs(good) == before
+
+
+def test_kernel_that_dies_as_it_starts_is_started_again(good, monkeypatch):
+    spec, seen = good.root / "kernels" / "python3" / "kernel.json", good.root / "seen"
+    code = (
+        f"import pathlib, runpy, sys; seen = pathlib.Path({str(seen)!r})\n"
+        "if not seen.exists():\n    seen.touch()\n    sys.exit(1)\n"
+        "runpy.run_module('ipykernel_launcher', run_name='__main__')"
+    )
+    argv = [sys.executable, "-c", code, "-f", "{connection_file}"]
+    spec.parent.mkdir(parents=True)
+    spec.write_text(json.dumps({"argv": argv, "display_name": "Python 3", "language": "python"}))
+    monkeypatch.setenv("JUPYTER_PATH", str(good.root))
+    assert [outcome.error for outcome in run(root=good.root, force=True)] == [None]
+    assert seen.exists()
 
 
 def test_notebooks_that_fail_leave_what_was_there(good, monkeypatch, capsys):

@@ -37,6 +37,7 @@ from .compare import outdated, replace, same_notebook
 PROFILES = ("full", "quick")
 AT_ONCE = 3  # notebooks: where one waits for the last task of a sweep, another goes on
 CELL_TIMEOUT = 3600  # seconds; papermill's own default is to wait for ever
+STARTS = 3  # of a kernel: two that begin at once may be given the same port, and one then dies
 EXECUTED, LOG = "executed.ipynb", "log.txt"  # in the folder of a run
 
 # Papermill, which ends its kernel before itself, also where this process is closed or killed.
@@ -229,16 +230,19 @@ def execute(
         "--cwd", path.parent, "--execution-timeout", str(round(timeout)),
         "-y", json.dumps(dict(parameters)),
     ]  # fmt: skip
-    with (
-        open(folder / LOG, "w") as log,
-        subprocess.Popen(command, env=variables, stdout=log, stderr=log) as process,
-    ):
-        _RUNNING.add(process)
-        try:
-            status = process.wait()
-        finally:
-            process.terminate()  # if it has not ended
-            _RUNNING.discard(process)
+    for _ in range(STARTS):
+        with (
+            open(folder / LOG, "w") as log,
+            subprocess.Popen(command, env=variables, stdout=log, stderr=log) as process,
+        ):
+            _RUNNING.add(process)
+            try:
+                status = process.wait()
+            finally:
+                process.terminate()  # if it has not ended
+                _RUNNING.discard(process)
+        if "Kernel died before replying" not in (folder / LOG).read_text("utf-8", "replace"):
+            break
     return _whole(path, folder, status)
 
 
