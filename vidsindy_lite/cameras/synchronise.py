@@ -34,6 +34,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations, product
 
 import numpy as np
@@ -58,7 +59,7 @@ from .clocks import (
     list_lags,
 )
 from .models import TRIMMED, Camera, at_once, epipolar_lines, epipolar_rows, missed, trimmed
-from .rig import ALIKE, BETTER, DISAGREEMENT, FINE, GROSS, Rig, check_seen
+from .rig import ALIKE, BETTER, DISAGREEMENT, FINE, GROSS, Rig, check_seen, disagreement
 from .unmeasured import posed
 
 _BLOCK = 200_000  # pairs of a lag and an instant at a time
@@ -567,7 +568,7 @@ def find_mistake(
         left = none.left(rig, none.paired(rig.cameras)[1])
         if left <= 2 * DISAGREEMENT:
             return None
-        for kind in (_views, _rates, _dropped):
+        for kind in (_views, _rates, partial(_dropped, start=start)):
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
             # none.
             ranked = [(*one.paired(rig.cameras), one) for one in kind(none, rig, names)]
@@ -630,47 +631,50 @@ def _rates(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
             yield replace(none, what=what, rates=rates / rates[0])
 
 
-def _dropped(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
+def _dropped(none: Mistake, rig: Rig, names: Sequence[str], start: Floats) -> Iterator[Mistake]:
     """Videos of which frames were dropped, each with the clock by which it agrees all the time."""
-    shares = ((0.0, _PART), (1 - _PART, 1.0))  # of a video, in one of which none is dropped, maybe
-    for low, high in shares:
-        rows = [slice(int(low * len(t)), int(high * len(t))) for t in none.tracks]
+    length = min(clock[-1] / rate for clock, rate in zip(none.clocks, none.rates, strict=True))
+    curves = tuple(map(Curve, none.tracks, none.clocks))
+    for low, high in ((0.0, _PART), (1 - _PART, 1.0)):  # in one of them none is dropped, maybe
+        ends = length * np.outer(none.rates, [low, high])
+        rows = [(e[0] <= c) & (c <= e[1]) for c, e in zip(none.clocks, ends, strict=True)]
         tracks = tuple(t[part] for t, part in zip(none.tracks, rows, strict=True))
-        clocks = tuple(c[part] for c, part in zip(none.clocks, rows, strict=True))
-        part = replace(none, tracks=tracks, clocks=clocks)
-        _, lags = part.paired(rig.cameras)
-        try:
-            learned = learn_cameras(align(tracks, lags, none.rates, clocks), rig)
-        except ValueError:
+        clocks = tuple(c[r] - e[0] for c, r, e in zip(none.clocks, rows, ends, strict=True))
+        part, learned = replace(none, tracks=tracks, clocks=clocks), []
+        for lags in (start, part.paired(rig.cameras)[1]):
+            with suppress(ValueError):
+                views = align(tracks, lags, none.rates, clocks)
+                one = learn_cameras(views, rig)
+                learned.append((max(disagreement(views, one)), lags, one.cameras))
+        if not learned:
             continue
-        curves = tuple(map(Curve, none.tracks, none.clocks))
-        jumps = [_jumps(curves, none.rates, learned.cameras, lags, j) for j in range(1, len(names))]
-        if all(found and found[0][1] < 0 for found in jumps):  # it is the first that lacks some
-            each = {0: [(frame, -lag) for frame, lag in jumps[0]]}
+        _, lags, cameras = min(learned, key=lambda one: one[0])
+        jumps = [_jumps(curves, none.rates, cameras, lags, j) for j in range(1, len(names))]
+        if all(found and found[0][2] < 0 for found in jumps):  # it is the first that lacks some
+            each = {0: [(frame, -jump) for frame, _, jump in jumps[0]]}
         else:
-            each = {j: found for j, found in enumerate(jumps, start=1) if found}
+            each = {j: [found[1:] for found in jumps[j - 1]] for j in range(1, len(names))}
         mended, told = list(none.clocks), []
         for j, found in each.items():
-            clock = mended[j].copy()
-            lag = 0.0 if j == 0 else lags[j] - (low > 0) * sum(jump for _, jump in found)
-            for frame, jump in found:
-                row = int(np.clip(np.rint((frame - lag) * none.rates[j]), 0, len(clock) - 1))
-                count, lag = round(jump * none.rates[j]), lag + jump
+            mended[j] = clock = mended[j].copy()
+            for place, jump in found:
+                row = int(np.clip(np.rint(place), 0, len(clock) - 1))
+                count = round(jump * none.rates[j])
                 clock[row:] += count
                 told.append(f"{count} frames dropped of {names[j]} before its frame {row}")
-            mended[j] = clock
         if told and all((np.diff(clock) > 0).all() for clock in mended):
             yield replace(none, what=", ".join(told), clocks=tuple(mended))
 
 
 def _jumps(
     curves: Sequence[Curve], rates: Floats, cameras: Sequence[Camera], lags: Floats, j: int
-) -> list[tuple[float, float]]:
-    """Where the lag of a video behind the first jumps for good, and by how much.
+) -> list[tuple[float, float, float]]:
+    """Frames of the first video and of another where its lag behind the first jumps; by how much.
 
     The lags that leave the least, each jump at a price, by dynamic programming.
     """
-    frames = curves[0].clock[:: -(-len(curves[0].clock) // _FRAMES)]
+    stride = -(-len(curves[0].clock) // _FRAMES)
+    frames = curves[0].clock[::stride]
     tried = lags[j] - lags[0] + np.arange(-_LONGEST, _LONGEST + 1)
     lines = epipolar_lines(cameras[0], curves[0].at(frames), cameras[j])
     theirs = curves[j].at((frames - tried[:, None]) * rates[j])
@@ -683,14 +687,21 @@ def _jumps(
     # What nobody saw costs as much as what was seen: no lag is better for leaving frames out.
     cost = np.minimum(missed / typical, _MOST)
     cost = np.nan_to_num(cost, nan=float(np.minimum(usual / typical, _MOST).mean()))
-    total, before = cost[:, 0], []
-    for now in cost[:, 1:].T:
-        best = int(total.argmin())
-        jumped = total > total[best] + _PRICE
-        before.append(np.where(jumped, best, np.arange(len(total))))
-        total = np.where(jumped, total[best] + _PRICE, total) + now
-    path = [int(total.argmin())]
-    for step in before[::-1]:
-        path.append(int(step[path[-1]]))
-    jumps = np.diff(path[::-1])
-    return [(float(frames[k + 1]), float(jumps[k])) for k in np.flatnonzero(jumps)]
+    # Both clocks go on: a lag that grows passes frames of the first video which the other lacks.
+    jumps = tried[:, None] - tried
+    passed = np.maximum(np.ceil(jumps / stride), 1).astype(int)
+    price = np.where(jumps == 0, 0.0, _PRICE + cost.mean(axis=1).min() * (passed - 1))
+    total, came = np.full(cost.T.shape, np.inf), np.zeros(cost.T.shape, dtype=int)
+    total[0], every = cost[:, 0], np.arange(len(tried))
+    for k in range(1, len(frames)):
+        ways = price + np.where(passed <= k, total[np.maximum(k - passed, 0), every], np.inf)
+        came[k] = ways.argmin(axis=1)
+        total[k] = ways[every, came[k]] + cost[:, k]
+    k, now, found = len(frames) - 1, int(total[-1].argmin()), []
+    while k > 0:
+        then = int(came[k, now])
+        if then != now:
+            place = (frames[k] - tried[now]) * rates[j]
+            found.append((float(frames[k]), float(place), float(jumps[now, then])))
+        k, now = k - int(passed[now, then]), then
+    return found[::-1]
