@@ -110,6 +110,18 @@ def of_a_law(seed):
     return (rig if seed % 2 else rig.uncalibrated(0)), tracks, sampled, rng
 
 
+def of_a_room(seed):
+    """The same of noisy tracks by perspective cameras that a hand has measured."""
+    rng = np.random.default_rng(seed)
+    true, noise = room(rng), 0.5
+
+    def sampled(view, rate):
+        return shot(rng, true, np.arange(0, 499, 1 / rate), noise=noise)[view]
+
+    tracks = shot(rng, true, np.arange(500), noise=noise)
+    return by_hand(rng, true), tracks, sampled, rng
+
+
 def swapped(rig, tracks, sampled, rng):
     i, j = sorted(rng.choice(3, 2, replace=False))
     order = [*range(3)]
@@ -149,9 +161,15 @@ MISTAKES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("seed", "cause"), [*zip((1, 2, 2, 504, 1), MISTAKES, strict=True)])
-def test_a_mistake_is_named(cause, seed):
-    rig, tracks, sampled, rng = of_a_law(seed)
+@pytest.mark.parametrize(
+    ("cause", "seed", "of"),
+    [
+        *((*one, of_a_law) for one in zip(MISTAKES, (1, 2, 2, 504, 1), strict=True)),
+        ("dropped", 51, of_a_room),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_named(cause, seed, of):
+    rig, tracks, sampled, rng = of(seed)
     given, what = MISTAKES[cause](rig, tracks, sampled, rng)
     found = find_mistake(given, rig, np.ones(3), None, np.zeros(3), VIEWS)
     assert what in found.text

@@ -59,7 +59,7 @@ from .clocks import (
     list_lags,
 )
 from .models import TRIMMED, Camera, at_once, epipolar_lines, epipolar_rows, missed, trimmed
-from .rig import ALIKE, BETTER, DISAGREEMENT, FINE, GROSS, Rig, check_seen, disagreement
+from .rig import ALIKE, BETTER, DISAGREEMENT, FINE, GROSS, Rig, check_seen
 from .unmeasured import posed
 
 _BLOCK = 200_000  # pairs of a lag and an instant at a time
@@ -568,17 +568,27 @@ def find_mistake(
         left = none.left(rig, none.paired(rig.cameras)[1])
         if left <= 2 * DISAGREEMENT:
             return None
+        found: list[Mistake] = []
         for kind in (_views, _rates, partial(_dropped, start=start)):
+            if found and found[-1].lags.residual <= DISAGREEMENT:
+                break
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
             # none.
             ranked = [(*one.paired(rig.cameras), one) for one in kind(none, rig, names)]
             ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
-            tried = [(one.left(rig, best), best, one) for _, best, one in ranked]
+            # Where a rig is rough, so are the best lags of two views: those that are given count.
+            tried = [
+                (one.left(rig, lags), lags, one)
+                for _, best, one in ranked
+                for lags in (start, best)
+            ]
             for now, best, one in sorted(tried, key=lambda one: one[0]):
                 if _MENDED * now < left:
                     told = learn_lags(one.tracks, rig, one.rates, best, one.clocks)
-                    if told.residual <= DISAGREEMENT:
-                        return replace(one, lags=told, before=left)
+                    if told.agree and told.residual <= 2 * DISAGREEMENT:
+                        found.append(replace(one, lags=told, before=left))
+                        break
+        return min(found, key=lambda one: one.lags.residual, default=None)
     return None
 
 
@@ -640,16 +650,15 @@ def _dropped(none: Mistake, rig: Rig, names: Sequence[str], start: Floats) -> It
         rows = [(e[0] <= c) & (c <= e[1]) for c, e in zip(none.clocks, ends, strict=True)]
         tracks = tuple(t[part] for t, part in zip(none.tracks, rows, strict=True))
         clocks = tuple(c[r] - e[0] for c, r, e in zip(none.clocks, rows, ends, strict=True))
-        part, learned = replace(none, tracks=tracks, clocks=clocks), []
-        for lags in (start, part.paired(rig.cameras)[1]):
-            with suppress(ValueError):
-                views = align(tracks, lags, none.rates, clocks)
-                one = learn_cameras(views, rig)
-                learned.append((max(disagreement(views, one)), lags, one.cameras))
-        if not learned:
+        try:
+            best = learn_lags(tracks, rig, none.rates, start, clocks)
+            views = align(tracks, best.frames, none.rates, clocks)
+            cameras = learn_cameras(views, rig).cameras
+        except ValueError:
             continue
-        _, lags, cameras = min(learned, key=lambda one: one[0])
-        jumps = [_jumps(curves, none.rates, cameras, lags, j) for j in range(1, len(names))]
+        if not best.agree:
+            continue
+        jumps = [_jumps(curves, none.rates, cameras, best.frames, j) for j in range(1, len(names))]
         if all(found and found[0][2] < 0 for found in jumps):  # it is the first that lacks some
             each = {0: [(frame, -jump) for frame, _, jump in jumps[0]]}
         else:
@@ -657,11 +666,14 @@ def _dropped(none: Mistake, rig: Rig, names: Sequence[str], start: Floats) -> It
         mended, told = list(none.clocks), []
         for j, found in each.items():
             mended[j] = clock = mended[j].copy()
+            lacking: dict[int, int] = {}
             for place, jump in found:
                 row = int(np.clip(np.rint(place), 0, len(clock) - 1))
-                count = round(jump * none.rates[j])
+                lacking[row] = lacking.get(row, 0) + round(jump * none.rates[j])
+            for row, count in lacking.items():
                 clock[row:] += count
-                told.append(f"{count} frames dropped of {names[j]} before its frame {row}")
+                if count:
+                    told.append(f"{count} frames dropped of {names[j]} before its frame {row}")
         if told and all((np.diff(clock) > 0).all() for clock in mended):
             yield replace(none, what=", ".join(told), clocks=tuple(mended))
 
