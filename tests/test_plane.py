@@ -201,7 +201,11 @@ def test_a_wrong_length_and_a_wrong_vertical_are_told(monkeypatch):
     found = vl.discover_from_video("throw.mp4", (*STICK[:4], 0.7), up=(0.3, -1))
     scale, vertical = found.warnings
     assert "the marks may be 0.714 times as far apart as is given" in scale
-    assert "degrees off the vertical" in vertical
+    assert "degrees off the vertical that was given" in vertical
+    filmed(monkeypatch, pixels_of(noisy(flight()[1], 0))[:, ::-1])  # held on its side
+    stick = (*np.reshape(STICK[:4], (2, 2))[:, ::-1].ravel(), STICK[4])
+    (vertical,) = vl.discover_from_video("throw.mp4", stick).warnings
+    assert "degrees off the vertical of the picture" in vertical
 
 
 def test_the_command_writes_g_with_its_error(monkeypatch, tmp_path, capsys):

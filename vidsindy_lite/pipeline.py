@@ -492,9 +492,11 @@ def _rig_warnings(
             f"({cameras.list_lags(best.frames)}) would explain it best"
         ]
     why = cameras.explain(tracks, given, learned)
-    if why is not None and why.left <= max(cameras.GROSS, max(missed) / 3):
+    worst = max(missed)
+    few = worst <= cameras.GROSS
+    if why is not None and (few or why.left <= max(cameras.GROSS / 2, worst / 3)):
         advice = f"{why.text(names)} would explain it best"
-    elif max(missed) > cameras.GROSS and cameras.smooth(tracks, learned):
+    elif not few and cameras.smooth(tracks, learned):
         advice = (
             "no single cause explains it; check the positions and normals, the scales and angles "
             "that are given, and that at least half of the shortest video is in common with the "
@@ -785,6 +787,8 @@ def _with_law(
         how |= {"library": Library.polynomial(1), "order": 2}
     moves = np.nanmin(seen.x, axis=0) < np.nanmax(seen.x, axis=0)  # in a plane or on a line
     with refusing("law", seen.tracks, names):
+        if not moves.any():
+            raise ValueError("tracks: must show a target that moves, got one that stands still")
         x, modes = seen.x[:, moves], seen.systematic[..., moves]
         found = dynamics.discover(seen.t, x, systematic=modes, **how)
     # Who keeps the law alone keeps the doubts about what it was found in.

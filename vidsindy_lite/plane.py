@@ -39,6 +39,8 @@ SURE = 3.0
 """Standard errors from which on a difference is one."""
 TILTED = np.deg2rad(2.0)
 """Standard error of a direction that is set by hand: of a vertical, and of where a camera looks."""
+HELD = np.deg2rad(10.0)
+"""Of the vertical of a picture, where no other is given: a telephone is held upright by hand."""
 FOCAL = 0.75
 """Focal length of a telephone over the longer side of its picture."""
 ASIDE = 5.0
@@ -344,11 +346,12 @@ def _contradicted(found: PlaneDiscovery, vertical: bool) -> list[str]:
                 else "it does not hang there, or the plane lies askew"
             )
             doubts.append(f"length: {g} is not the {EARTH} of what flies or swings freely: {wrong}")
-    if vertical and found.circle is None and g is not None:
+    if found.circle is None and g is not None:
         pull = found.discovery.physics()["direction"]
         tilt = np.arctan2(pull.value[0], -pull.value[1])
-        if abs(tilt) > SURE * np.hypot(float(pull.error[0]), TILTED):
+        error, whose = (TILTED, "that was given") if vertical else (HELD, "of the picture")
+        if abs(tilt) > SURE * np.hypot(float(pull.error[0]), error):
             doubts.append(
-                f"up: the pull is {np.rad2deg(tilt):.3g} degrees off the vertical that was given"
+                f"up: the pull is {np.rad2deg(tilt):.3g} degrees off the vertical {whose}"
             )
     return doubts

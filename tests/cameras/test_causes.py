@@ -24,7 +24,7 @@ def flawed(rng, what):
     tracks = shot(rng, rig, FRAMES, (0, 0, 0, late.get(what, 0.0)))
     *others, last = (replace(c, distortion=None, readout=0.0) for c in rig.cameras)
     change = {
-        "normal": {"normal": last.normal + 0.02 * last.rows[0]},
+        "direction": {"normal": last.normal + 0.02 * last.rows[0], "angle": last.angle + 0.02},
         "position": {"position": last.position + 0.05 * last.rows[1]},
         "scale": {"scale": 1.03 * last.scale},
     }
@@ -38,7 +38,7 @@ def flawed(rng, what):
 
 
 CAUSES = {
-    "normal": r"the normal \([-\d., ]+\) of cameras\[3\] \(d.mp4\)",
+    "direction": r"the normal .* and the angle .* of cameras\[3\] \(d.mp4\)",
     "position": r"the position \([-\d., ]+\) of cameras\[3\] \(d.mp4\)",
     "scale": r"a scale -[\d.]+ % off of cameras\[3\] \(d.mp4\)",
     "distortion": r"a distortion of the lens of all cameras, .* k1 off by -0.",

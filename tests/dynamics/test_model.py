@@ -186,7 +186,11 @@ def with_value(row, value):
         (T[:4], X, r"t: must have shape \(5,\) as x has 5 rows, got \(4,\)"),
         (np.array([0, 1, 1, 3, 4]), X, r"t: must increase, got t\[1\] = 1 before t\[2\] = 1"),
         (T, with_value(3, np.inf), "x: must not be infinite .* got infinity in row 3"),
-        (T, with_value(3, -1e150), r"x: must be at most 1e\+100, got 1e\+150: take another unit"),
+        (
+            T,
+            with_value(3, -1e150),
+            r"x: must be between 1e-100 and 1e\+100, got 1e\+150 at most: take another unit",
+        ),
         (T, np.diag(np.full(5, np.nan)) + 1, "x: must hold at least one row without NaN, got 5"),
         (T, np.full((5, 2), np.nan), "x: must hold a number, got 5 rows of NaN"),
     ],

@@ -11,6 +11,7 @@ import vidsindy_lite as vl
 from vidsindy_lite import Library, PolynomialSystem
 from vidsindy_lite.dynamics.result import Discovery, _with_error
 from vidsindy_lite.dynamics.solver import discover
+from vidsindy_lite.study.corruption import add_correlated_noise
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +48,18 @@ def test_errors_are_zero_where_there_is_no_term_and_carried_along_with_a_shift(f
     assert np.sqrt(gradient @ covariance @ gradient) == pytest.approx(
         found.offset_errors[0], rel=1e-6
     )
+
+
+def test_what_vanishes_with_an_origin_pins_no_coefficient():
+    law = PolynomialSystem.from_terms({
+        "x": {"1": 2, "x": -0.25, "y^2": -1, "z^2": -1}, "y": {"1": 1, "y": -1, "xy": 1, "xz": -4},
+        "z": {"z": -1, "xy": 4, "xz": 1},
+    })  # fmt: skip
+    t = np.linspace(0, 10, 300)
+    x = add_correlated_noise(law.simulate(t, (1, 1, 1)), 0.03, np.random.default_rng(1))
+    found = discover(t, x, degree=2)
+    both = found.system.support & found.native.support
+    assert (found.standard_errors[both] > 0.1 * found.native_standard_errors[both]).all()
 
 
 # ----------------------------------------------------------------------- to use a law, and keep it

@@ -27,8 +27,8 @@ TRACKER_5 = (
     "9.9E-2\t13.5\t23.5\n"
 )
 TRACKER_6 = (
-    "#multi:\n\tmass A\t\t\nt\tx\ty\t\n0,0\t10,25\t20,5\t\n0,033\t11,0\t21,0\t\n0,066\t\t\t\n"
-    "0,099\t13\t23\t\n"
+    "#multi:\n\tmass A\t\t\nt\tx\ty\t\n0,0\t10,75\t21,0\t\n0,033\t11,5\t21,5\t\n0,066\t\t\t\n"
+    "0,099\t13,5\t23,5\t\n"
 )
 
 
@@ -153,7 +153,7 @@ def test_times_are_kept_and_trackers_world_is_not_taken_for_pixels(tmp_path):
     assert "export its columns pixelx and pixely" in track.warnings[0]
     assert read(tmp_path, TRACKER_5)[0].warnings == ()
     with pytest.raises(ValueError, match="got x and y of Tracker or Kinovea with another"):
-        read(tmp_path, TRACKER_6.replace("20,5", "-20,5"))
+        read(tmp_path, TRACKER_6.replace("21,0", "-21,0"))
 
 
 @pytest.mark.parametrize(

@@ -521,7 +521,8 @@ class Cause:
         one = f"cameras[{i}] ({names[i]})"
         whose = one if len(self.cameras) == 1 else "all cameras"
         parts = {
-            "normal": f"the normal ({decimals(camera.normal)}) of {whose}",
+            "direction": f"the normal ({decimals(camera.normal)}) and the angle "
+            f"({camera.angle:.4f}) of {whose}",
             "position": f"the position ({decimals(np.asarray(camera.position))}) of {whose}",
             "scale": f"a scale {100 * np.expm1(change[PARTS['scale']][0]):+.2g} % off of {whose}",
             "distortion": f"a distortion of the lens of {whose}, for {one} k1 off "
@@ -589,9 +590,10 @@ def _causes(near: Adjustment) -> list[Cause]:
         freed[np.ix_(cameras, parts)] = True
         return Cause(what, cameras, freed, near)
 
-    found = [
+    found = [cause("direction", (i,), PARTS["normal"] + PARTS["angle"]) for i in every]
+    found += [
         cause(what, (i,), PARTS[what][: 2 if i in flat else None])
-        for what in ("normal", "position", "scale", "readout", "lag", "drift")
+        for what in ("position", "scale", "readout", "lag", "drift")
         for i in every
     ]
     lens = PARTS["distortion"][:2]  # k1 and k2: few motions tell more

@@ -387,6 +387,8 @@ def _page(
     about |= {"unit": getattr(found, "unit", "scene units")}  # metres or pixels of one camera
     law = found.discovery
     about |= {"axes": law.axes, "swing": "" if found.swing is None else str(found.swing)}
+    noises = zip(law.system.names, law.noise, strict=False)  # of velocities there is none
+    about |= {"noises": [(name, value) for name, value in noises if np.isfinite(value)]}
     about |= {"physics": str(law.physics()) if law.system.order == 2 else ""}
     film = None if paths is None else base64.b64encode(law_over_videos(found, paths)).decode()
     return page("report.html", figures=figures, film=film, **about, **content)

@@ -61,9 +61,14 @@ def _check_samples(t: Floats, x: Floats) -> Trajectory:
             f"x: must not be infinite (NaN marks what was not seen), "
             f"got infinity in row {int(np.flatnonzero(np.isinf(x).any(axis=1))[0])}"
         )
-    largest = np.nanmax(np.abs(x), initial=0.0)
-    if largest > FARTHEST:
-        raise ValueError(f"x: must be at most {FARTHEST:g}, got {largest:g}: take another unit")
+    for name, values in (("t", t), ("x", x)):
+        sizes = np.abs(values[(values != 0) & ~np.isnan(values)])
+        largest = sizes.max(initial=0.0)
+        if largest > FARTHEST or 0 < largest < 1 / FARTHEST:
+            raise ValueError(
+                f"{name}: must be between {1 / FARTHEST:g} and {FARTHEST:g}, got {largest:g} at "
+                "most: take another unit"
+            )
     rows = ~np.isnan(x).all(axis=1)
     if not rows.any():
         raise ValueError(f"x: must hold a number, got {len(x)} rows of NaN")

@@ -222,11 +222,13 @@ def _pruned(
         k = live[np.lexsort([weakness, np.where(weakness < 1, powers[live], size)])[0]]
         dead[k] = True
         point = native
-        for _ in range(3):  # the shift is linear around where it is held alone
+        for _ in range(40):  # until it is zero: else what vanishes with it still seems to vary
             flat, slopes = moved(point)
             pull = covariance @ slopes[k]
             room = slopes[k] @ pull
             point = native - pull * ((flat[k] + slopes[k] @ (native - point)) / room)
+            if flat[k] ** 2 <= 1e-20 * original[k]:
+                break
         covariance = covariance - np.outer(pull, pull / room)
         native = point
         flat, slopes = moved(native)

@@ -294,7 +294,8 @@ class Discovery:
         """Where the axes of the law point in those of the data; empty if they are these."""
         if self.orientation is None:
             return ""
-        rows = (", ".join(f"{part:.4f}" for part in row) for row in self.orientation)
+        rounded = np.round(self.orientation, 4) + 0.0  # none of them -0
+        rows = (", ".join(f"{part:.4f}" for part in row) for row in rounded)
         pairs = zip(self.system.names, rows, strict=False)
         return "turned, " + ", ".join(f"{name} along ({row})" for name, row in pairs)
 

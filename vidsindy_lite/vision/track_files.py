@@ -373,9 +373,7 @@ def _track(
         pixels = np.column_stack([columns[key] for key in pair])
     else:
         raise ValueError(f"must have columns u and v, got {', '.join(columns) or 'none':.80}")
-    if pair == ("pixelx", "pixely"):  # corners at integers
-        pixels -= 0.5
-    if of_world and pair == ("x", "y"):
+    if of_world := of_world and pair == ("x", "y"):
         if np.nanmin(pixels, initial=0) < 0:
             raise ValueError(
                 "must hold pixels from the upper left corner, got x and y of Tracker or Kinovea "
@@ -395,12 +393,18 @@ def _track(
         marks = ", ".join(f"{value:g}, {value:g}" for value in np.unique(pixels[unset, 0]))
         doubts += (f"{name}: {marks} in {unset.sum()} of {len(unset)} rows is taken for not seen",)
     pixels[unset | ~np.isfinite(pixels).all(axis=1)] = np.nan
+    # Tracker, which writes times as well, counts from the corner of the first pixel.
+    if pair == ("pixelx", "pixely") or (of_world and "t" in columns):
+        pixels -= 0.5
     frames = next((columns[key] for key in _FRAME if key in columns), None)
     counts = frames is not None and _counts(frames)
     clock = next((match for key in columns if (match := _TIME.fullmatch(key))), None)
     if clock is None:
         if frames is not None and not counts:
-            raise ValueError("must have increasing whole numbers of frames")
+            raise ValueError(
+                "must have increasing whole numbers of frames within ten million, got "
+                + ", ".join(f"{frame:.10g}" for frame in frames[:4])
+            )
         if frames is None:
             return TrackFile(name, pixels, None, doubts, upwards=upwards)
         whole = (frames - frames[0]).astype(int)
