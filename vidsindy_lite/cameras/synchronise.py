@@ -517,6 +517,7 @@ class Mistake:
     clocks: tuple[Floats, ...]
     lags: Lags = Lags(np.zeros(0), np.zeros(0), np.zeros(0), np.inf)
     before: float = np.inf
+    alike: tuple[str, ...] = ()
 
     @property
     def text(self) -> str:
@@ -525,6 +526,7 @@ class Mistake:
             f"the rig does not agree with the tracks as they are given: {self.what} explains it "
             f"({self.lags.residual:.2g} pixels apart instead of {self.before:.3g}), and was put "
             "right here: do so in what is given"
+            + (f"; as well do {', and '.join(self.alike)}: another path" if self.alike else "")
         )
 
     def paired(self, cameras: Sequence[Camera]) -> tuple[float, Floats]:
@@ -586,7 +588,9 @@ def find_mistake(
                 if _MENDED * now < left:
                     told = learn_lags(one.tracks, rig, one.rates, best, one.clocks)
                     if told.agree and told.residual <= 2 * DISAGREEMENT:
-                        found.append(replace(one, lags=told, before=left))
+                        others = [o.what for n, _, o in tried if n <= ALIKE * max(now, FINE)]
+                        alike = tuple(dict.fromkeys(o for o in others if o != one.what))
+                        found.append(replace(one, lags=told, before=left, alike=alike))
                         break
         return min(found, key=lambda one: one.lags.residual, default=None)
     return None
