@@ -81,8 +81,9 @@ def _discover(options: argparse.Namespace) -> int:
       python -m vidsindy_lite discover --tracks a.csv b.csv c.csv --rig rig.toml --fps 30
 
     The folder then holds report.html (one page, images included), result.json (the same as data),
-    tracks.csv and rig.toml (the learned cameras), beside whatever else is there. If tracks were
-    found but no law, it holds a picture of them; if anything else fails, what it held before.
+    tracks.csv and, of several cameras, rig.toml (as they were learned), beside whatever else is
+    there. If tracks were found but no law, it holds a picture of them; if anything else fails, what
+    it held before.
 
     exit status: 0 if there is no reason to doubt the law, 1 if there is (the report says which),
     2 if there is no law; the error says why.

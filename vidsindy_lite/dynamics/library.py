@@ -722,16 +722,16 @@ def own(
             return np.asarray(rule(*(values[argument] for argument in arguments)), dtype=float)
 
     try:
-        shape, longer = (evaluate(np.ones((n, len(names)))).shape for n in (2, 3))
+        shape, longer = (evaluate(np.ones((n, len(names)))).shape for n in (2, 97))
     except Exception as error:  # whatever a function of one's own may raise
         raise ValueError(
             f"library: {name!r} must take and return arrays of shape (n,), as numpy's functions "
             f"do, got {type(error).__name__}: {error}"
         ) from error
-    if shape not in ((2,), (measured, 2)) or longer != (*shape[:-1], 3):
+    if shape not in ((2,), (measured, 2)) or longer != (*shape[:-1], 97):
         raise ValueError(
             f"library: {name!r} must return an array of the shape of its arguments, (n,), or "
-            f"{measured} of these, got shape {shape} for n = 2 and {longer} for n = 3"
+            f"{measured} of these, got shape {shape} for n = 2 and {longer} for n = 97"
         )
     latex = rf"\mathrm{{{name}}}"
 
