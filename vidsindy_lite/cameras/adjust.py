@@ -15,8 +15,8 @@ is off (w = (limit / miss)^2, the weight of Geman and McClure's kind).
 A change of a camera is one vector: two tilts of the normal and the in-plane angle (radians), the
 logarithm of the scale, the position along the axes of the view plane and along its normal (scene
 units), the principal point (pixels), k1, k2, p1, p2, the readout of the shutter (frames); and what
-no rig file holds: by how many frames the video is late, by how many more at its end than at its
-start, and how near an orthographic camera is to what it sees (the inverse of its distance).
+no rig file holds: by how many frames the video is late, and by how many more at its end than at its
+start.
 
 Errors of tracks depend on their neighbours. With the slopes J of the residuals r, their noise sigma
 and the information P of measurements, what was fitted has the covariance
@@ -47,7 +47,7 @@ Triggs et al. 2000, "Bundle adjustment: a modern synthesis".
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -83,11 +83,10 @@ PARTS = {
     "readout": [13],
     "lag": [14],
     "drift": [15],
-    "nearness": [16],
 }
 """Which components of the vector belong to what."""
 
-SIZE = 17
+SIZE = 16
 STEPS = 60
 """That a search takes at most."""
 _LARGEST = 50.0  # logarithm of a scale: a step that leads there is not taken
@@ -183,19 +182,6 @@ def known_to(given: Camera) -> Floats:
     return errors
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class NearCamera(OrthographicCamera):
-    """What an orthographic camera would be that is not infinitely far from the point `about`."""
-
-    about: Floats
-    nearness: float = 0.0
-
-    @property
-    def _last_row(self) -> Floats:
-        away = self.nearness * self.normal
-        return np.append(-away, 1 + away @ self.about)
-
-
 def changed(camera: Camera, change: Floats) -> Camera:
     """A calibrated camera after a change; lag and drift are none of its own."""
     part = {name: change[place] for name, place in PARTS.items()}
@@ -214,8 +200,6 @@ def changed(camera: Camera, change: Floats) -> Camera:
         values["distortion"] = frozen(before + step)
     if part["readout"].any():
         values["readout"] = float(np.clip(camera.readout + part["readout"][0], -1, 1))
-    if part["nearness"].any() and isinstance(camera, NearCamera):
-        values["nearness"] = camera.nearness + part["nearness"][0]
     moved = camera.moved(**values) if values else camera
     if part["angle"].any() or part["scale"].any():
         scale, angle = camera.calibration
@@ -328,7 +312,6 @@ class Adjustment:
         sizes = np.ones(self.errors.shape)
         sizes[:, PARTS["position"]] = self.reach
         sizes[:, PARTS["principal point"]] = [[camera.image_size[0]] for camera in self.start]
-        sizes[:, PARTS["nearness"]] = 1 / self.reach
         return sizes
 
     @cached_property
@@ -531,8 +514,6 @@ class Cause:
             "lag": f"a lag of {names[i]} that is off by {change[PARTS['lag']][0]:.2f} frames",
             "drift": f"another clock of {names[i]}, {abs(change[PARTS['drift']][0]):.2g} frames "
             f"{'slow' if change[PARTS['drift']][0] > 0 else 'fast'} over the whole video,",
-            "nearness": "perspective, where the cameras are taken as orthographic, for "
-            f"{one} a distance of {1 / max(abs(change[PARTS['nearness']][0]), 1e-12):.3g},",
         }
         return parts[self.what]
 
@@ -549,13 +530,10 @@ def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Cause | None:
     """
     views = check_views(tracks, learned)
     errors = np.array([known_to(camera) for camera in given.cameras])
-    points, _ = intersect(learned.cameras, views)
-    seen = np.isfinite(points).all(axis=1)
-    if not seen.any():
+    if not np.isfinite(intersect(learned.cameras, views)[0]).any():
         return None
     far = smooth(tracks, learned) and max(disagreement(tracks, learned)) > GROSS
-    start = [_near(camera, points[seen].mean(axis=0)) for camera in learned.cameras]
-    footage = Footage.of(tracks)
+    footage, start = Footage.of(tracks), learned.cameras
     near = adjust(footage, start, np.where(errors > 0, errors, np.inf), most=0)
     causes = [cause for cause in _causes(near) if (cause.freed & (errors == 0)).any()]
     told = [_evidence(near, errors[near.free] > 0, cause.freed[near.free]) for cause in causes]
@@ -599,17 +577,7 @@ def _causes(near: Adjustment) -> list[Cause]:
     found.append(cause("readout", every, PARTS["readout"]))
     if pinholes:
         found.append(cause("distortion", pinholes, lens))
-    if flat:  # the scale is then that of another distance
-        found.append(cause("nearness", flat, PARTS["nearness"] + PARTS["scale"]))
     return found
-
-
-def _near(camera: Camera, about: Floats) -> Camera:
-    """The same camera, ready to be not infinitely far if it is orthographic."""
-    if not isinstance(camera, OrthographicCamera):
-        return camera
-    values = {part.name: getattr(camera, part.name) for part in fields(camera)}
-    return NearCamera(about=about, **values)
 
 
 def _sizes(rows: Floats) -> Floats:

@@ -4,10 +4,9 @@ Two cameras see one point only if they look at the same instant; otherwise their
 each other, and no camera can mend it. So the lags are those of the smallest reprojection error, and
 are found in three steps:
 
-1. pair by pair, with a calibrated camera: the epipolar equation (`rig.epipolar_lines`) is
-   linear in what is unknown of the other camera, and is solved at all whole lags at once. It is
-   solved a second time with a shift of the other image, which takes up most of what a badly
-   measured normal or position does;
+1. pair by pair, with a calibrated camera: the epipolar equation (`models.epipolar_lines`) is
+   linear in what is unknown of the other camera, and is solved at all whole lags at once; with a
+   shift of the other image, which takes up most of what a badly measured normal or position does;
 2. all cameras together (`adjust`), in some of the frames, from the most promising whole lags;
 3. from the best of these, in all frames.
 
@@ -62,7 +61,7 @@ from .rig import ALIKE, BETTER, DISAGREEMENT, FINE, GROSS, Rig, check_seen
 from .unmeasured import posed
 
 _BLOCK = 200_000  # pairs of a lag and an instant at a time
-_PROMISING = 4  # lags of each camera, with and without a shift
+_PROMISING = 8  # lags of each camera
 _BETTER_PART = 0.7  # of all frames or equations, in which there is no outlier
 _APART = 1.0  # frames; lags closer than that are one and the same
 _PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
@@ -90,17 +89,13 @@ _ROUNDING = 1e-9  # scene units, or a share of a slope that is motion
 
 def promising_lags(footage: Footage, cameras: Sequence[Camera]) -> list[list[float]]:
     """Whole lags of each camera behind the first calibrated one, the most promising first."""
-    both = (lag_misses(footage, cameras, shift=shift) for shift in (False, True))
-    found = []
-    for without, shifted in zip(*both, strict=True):
-        choices = [lag for misses in (without, shifted) for lag in dips(*misses)[:_PROMISING]]
-        found.append([*dict.fromkeys(choices)] or [0.0])
+    found = [dips(*misses)[:_PROMISING] or [0.0] for misses in lag_misses(footage, cameras)]
     found.insert(first_known(cameras), [0.0])
     return found
 
 
 def lag_misses(
-    footage: Footage, cameras: Sequence[Camera], most: int = INSTANTS, shift: bool = False
+    footage: Footage, cameras: Sequence[Camera], most: int = INSTANTS
 ) -> Iterator[tuple[Floats, Floats]]:
     """Of each camera but the first calibrated one, all whole lags (k,) and `pair_missed` at these.
 
@@ -115,13 +110,12 @@ def lag_misses(
         margin = OVERLAP * min(ends[known], ends[other])
         lags = np.arange(np.ceil(margin - ends[other]), ends[known] - margin + 1)
         first, second = cameras[known], cameras[other]
-        placed = first.is_placed and second.is_placed
         lines = epipolar_lines(first.somewhere, curves[known].at(frames), second.somewhere)
         instants, rate = frames / footage.rates[known], footage.rates[other]
         missed = []
         for block in np.array_split(lags, int(np.ceil(lags.size * frames.size / _BLOCK))):
             theirs = curves[other].at((instants - block[:, None]) * rate)
-            missed.append(pair_missed(second, placed, lines, theirs, shift))
+            missed.append(pair_missed(second, lines, theirs))
         yield lags, np.concatenate(missed)
 
 
@@ -130,20 +124,15 @@ def first_known(cameras: Sequence[Camera]) -> int:
     return next(i for i, camera in enumerate(cameras) if camera.is_calibrated)
 
 
-def pair_missed(
-    other: Camera, placed: bool, lines: tuple[Floats, Floats], theirs: Floats, shift: bool
-) -> Floats:
+def pair_missed(other: Camera, lines: tuple[Floats, Floats], theirs: Floats) -> Floats:
     """By how much its pixels, (k, n, 2), miss the epipolar lines at best, (k,), scene units rms.
 
-    `placed` says whether both positions are known, `shift` whether the image may be shifted. One
-    instant in ten is left out. Infinite where too few are left.
+    Its image may be shifted. One instant in ten is left out. Infinite where too few are left.
     """
     design, target = epipolar_rows(lines, other, theirs)
     target = target - design @ other.scaled_turn
-    design = design[..., : 0 if other.is_calibrated else 2]
-    extra = lines[0] if shift else np.ones((len(lines[0]), 1)) if not placed else lines[0][:, :0]
-    extra = np.broadcast_to(extra, (*target.shape, extra.shape[1]))
-    design = np.concatenate((design, extra), axis=-1)
+    shift = np.broadcast_to(lines[0], design.shape)
+    design = shift if other.is_calibrated else np.concatenate((design, shift), axis=-1)
     seen = np.isfinite(target) & np.isfinite(design).all(axis=-1)
     design, target = np.where(seen[..., None], design, 0), np.where(seen, target, 0)
     fits = seen

@@ -24,7 +24,7 @@ that is how `view_distances` tells the one from the other.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -451,27 +451,6 @@ def _shape(alpha: Floats, u: Floats, v: Floats) -> Floats:
 # ------------------------------------------------------------------------------------------- track
 
 
-def track_blobs(model: BackgroundModel, frames: Iterable[Image]) -> Iterator[Blob | None]:
-    """The target in each frame (None if not found): near its predicted position, else anywhere."""
-    position, velocity, age = None, np.zeros(2), 0
-    for frame in frames:
-        blob = None
-        if position is not None and age < 3:
-            radius = np.sqrt(model.area / np.pi)
-            half = 2 * radius + 8 + 0.5 * np.abs(velocity).max()
-            blob = model.measure(frame, position + (age + 1) * velocity, half)
-        if blob is None:
-            near = model.search(frame)
-            blob = near and model.measure(frame, *near)
-        if blob is None or blob.shape is None:
-            age += 1
-        else:
-            if position is not None:
-                velocity = (blob.centroid - position) / (age + 1)
-            position, age = blob.centroid, 0
-        yield blob
-
-
 def view_distances(blobs: Sequence[Blob | None]) -> Floats:
     """How far each view (None = not found) is from those of the whole target, (n,).
 
@@ -503,7 +482,10 @@ def whole_blobs(model: BackgroundModel, frames: Iterable[Image]) -> tuple[Floats
     And whether outlines are too blurred to tell whole views by: where these are blurred, by motion
     or a codec, and many views are left out, it is by the blur that they differ.
     """
-    blobs = list(track_blobs(model, frames))
+    blobs = []
+    for frame in frames:
+        near = model.search(frame)
+        blobs.append(model.measure(frame, *near) if near else None)
     distance = view_distances(blobs)
     # A view beside a distant one may be cut a little: it must be twice as close.
     whole = ~ndimage.binary_propagation(distance > 1, mask=distance > 0.5)
