@@ -72,7 +72,6 @@ from .models import (
 )
 from .rig import FINE, GROSS, Rig, check_views, decimals, disagreement, residuals
 
-_UNTOLD = 1e-15  # of the largest information of any direction: rounding
 PARTS = {
     "normal": [0, 1],
     "angle": [2],
@@ -92,20 +91,15 @@ STEPS = 60
 _LARGEST = 50.0  # logarithm of a scale: a step that leads there is not taken
 _TANGENTIAL = 0.1  # p1 and p2 of a lens, in units of k1
 _OUTLIER = 6.0  # sigma
-_USED = 0.5  # weight of a frame that holds no outlier
 _PRIOR_NOISE = 0.02  # pixels; no track is better than that beside a measurement
 _ENOUGH = 1e-7  # of sigma, by which a last step moves the images, or ...
 _IN_TIME = 1e-4  # ... if clocks move, whose slopes are rough, and in frames
 _LONGEST = 1.0  # frames: further than that, the slope in a lag does not hold
-_LOST = 0.05  # share of what is seen that a step in time may lead out of the video
 _PROBE = 1e-6  # of a unit: slopes are taken over twice that, and less is no change
 _BESIDE = 2  # frames around an outlier into which interpolation carries a part of it
 _FLAT = 1e-9  # of the largest pivot; smaller ones leave a point where it is
 # Tried in turn, until a step leads downhill: fine where focal length and distance hardly differ.
 _DAMPING = (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2)
-_CHANCE = 1e-6  # of a T that large without a cause
-_TRIED = 5  # of the causes that stand out most
-_SMOOTH = 0.3  # correlation of a residual with the next; that of noise is zero
 LAG, DRIFT = PARTS["lag"][0], PARTS["drift"][0]
 
 
@@ -125,7 +119,8 @@ def fitted_factor(missed: Floats, slopes: Floats, prior: Floats, noise: float) -
     size = np.sqrt(np.diag(square))  # of each parameter: units of pixels, metres and radians
     size[size == 0] = 1.0
     values, ways = np.linalg.eigh(square / np.outer(size, size))
-    told = values > _UNTOLD * values.max(initial=0.0)
+    # Less of the largest information of any direction is rounding.
+    told = values > 1e-15 * values.max(initial=0.0)
     # In the directions of `half`, of length one over sigma, W is the unit matrix.
     half = ways[:, told] / np.sqrt(values[told]) / size[:, None]
     scores = np.einsum("nmk,nm->nk", slopes, missed) @ half
@@ -289,7 +284,7 @@ class Adjustment:
     @property
     def used(self) -> Bools:
         """Instants that hold no outlier, (n,)."""
-        return self.weights > _USED
+        return self.weights > 0.5
 
     @property
     def free(self) -> Bools:
@@ -451,7 +446,8 @@ def _downhill(state: Adjustment) -> tuple[Adjustment | None, float]:
     def cost(other: Adjustment) -> float:
         """What is to be smallest; infinite if points that were seen before would not be."""
         lost = ~np.isfinite(other.misses[seen])
-        if lost.any() and lost.mean() > (_LOST if state.timed else 0.0):
+        # Share of what is seen that a step in time may lead out of the video.
+        if lost.any() and lost.mean() > (0.05 if state.timed else 0.0):
             return np.inf
         squares = np.nansum(np.where(seen, other.misses, 0.0) ** 2, axis=1)
         off = prior * other.change[free]
@@ -539,7 +535,8 @@ def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Cause | None:
     told = [_evidence(near, errors[near.free] > 0, cause.freed[near.free]) for cause in causes]
     # Where views are far apart, and no noise makes it, no test is needed.
     rank = [explained if far else evidence for evidence, explained in told]
-    likely = [causes[k] for k in np.argsort(rank)[::-1][:_TRIED] if rank[k] > (0 if far else 1)]
+    # The five that stand out most.
+    likely = [causes[k] for k in np.argsort(rank)[::-1][:5] if rank[k] > (0 if far else 1)]
     tried = [
         replace(cause, found=adjust(footage, start, np.where(cause.freed, np.inf, errors)))
         for cause in likely
@@ -553,7 +550,8 @@ def smooth(tracks: Sequence[Floats], learned: Rig) -> bool:
     both = np.isfinite(missed[1:]) & np.isfinite(missed[:-1])
     limit = np.nanquantile(np.abs(missed), TRIMMED) if both.any() else 0.0
     before, after = (np.clip(part[both], -limit, limit) for part in (missed[:-1], missed[1:]))
-    return bool(before @ after > _SMOOTH * np.sqrt((before @ before) * (after @ after)))
+    # Correlation of a residual with the next; that of noise is zero.
+    return bool(before @ after > 0.3 * np.sqrt((before @ before) * (after @ after)))
 
 
 def _causes(near: Adjustment) -> list[Cause]:
@@ -605,5 +603,6 @@ def _evidence(near: Adjustment, free: Bools, wanted: Bools) -> tuple[float, floa
     rest_degrees = degrees - rank + 1
     if explained < FINE or rest_degrees <= 0:
         return 0.0, explained
-    chance = float(fdtri(rank, rest_degrees, 1 - _CHANCE))
+    # The chance of a T that large without a cause.
+    chance = float(fdtri(rank, rest_degrees, 1 - 1e-6))
     return float(score @ score) * rest_degrees / (chance * rank * degrees), explained

@@ -58,25 +58,16 @@ from .models import TRIMMED, Camera, at_once, epipolar_lines, epipolar_rows, mis
 from .rig import ALIKE, BETTER, DISAGREEMENT, FINE, GROSS, Rig, check_seen
 from .unmeasured import posed
 
-_BLOCK = 200_000  # pairs of a lag and an instant at a time
 _PROMISING = 8  # lags of each camera
-_BETTER_PART = 0.7  # of all frames or equations, in which there is no outlier
-_APART = 1.0  # frames; lags closer than that are one and the same
 _PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
-_CLEAR = 4.0  # standard errors by which a clock must drift, ...
-_ENOUGH = 0.05  # ... and frames over the whole video
 _TIMES = LAG, DRIFT
 BLURRED = 0.5
 """Standard error of a lag, in frames, beyond which it counts as unknown."""
 
-_ROUGH_STEPS = 8  # of the second step
 _SHOWN = 3  # of the lags that fit equally well
-_LOOSE = 0.05  # of tilts, log scales and angles that a hand measured: three degrees, 5 %
 RATES = ((25, 30), (30, 25), (24, 30), (30, 24), (24, 25), (25, 24), (30, 60), (60, 30))
 """Rates over those stated that are taken for each other."""
-_MENDED = 3.0  # times by which a mistake has to mend the disagreement of all views together
 _INSTANTS = 60  # at which two views are compared
-_MISTAKES = 16  # of a kind that mend most, tried with all cameras
 _MANY = 6  # cameras, of which only two are taken for each other
 _ROUNDING = 1e-9  # share of a slope that is motion
 
@@ -107,7 +98,8 @@ def lag_misses(
         lines = epipolar_lines(first.somewhere, curves[known].at(frames), second.somewhere)
         instants, rate = frames / footage.rates[known], footage.rates[other]
         missed = []
-        for block in np.array_split(lags, int(np.ceil(lags.size * frames.size / _BLOCK))):
+        # So many pairs of a lag and an instant at a time.
+        for block in np.array_split(lags, int(np.ceil(lags.size * frames.size / 200_000))):
             theirs = curves[other].at((instants - block[:, None]) * rate)
             missed.append(pair_missed(second, lines, theirs))
         yield lags, np.concatenate(missed)
@@ -143,7 +135,8 @@ def pair_missed(other: Camera, lines: tuple[Floats, Floats], theirs: Floats) -> 
 
 def score(fit: Adjustment) -> float:
     """What is left, if errors are normal but for some outliers: by the better part of them."""
-    return fit.left(_BETTER_PART)
+    # The share of them in which there is no outlier.
+    return fit.left(0.7)
 
 
 def in_common(fit: Adjustment) -> bool:
@@ -168,7 +161,8 @@ def agrees(fit: Adjustment) -> bool:
 
 def near(fit: Adjustment, lags: Floats) -> bool:
     """Whether its lags are those."""
-    return bool(np.abs(fit.footage.lags - lags).max() < _APART)
+    # Frames; lags closer than that are one and the same.
+    return bool(np.abs(fit.footage.lags - lags).max() < 1.0)
 
 
 def shares(fit: Adjustment) -> Floats:
@@ -209,7 +203,8 @@ def drifted(fit: Adjustment) -> Adjustment:
     if not in_common(free):
         return fit
     off[1:] = np.sqrt(np.diag(covariance(free)))[len(off) - 1 :]
-    clear = np.abs(free.change[:, DRIFT]) > np.maximum(_CLEAR * off, _ENOUGH)
+    # Standard errors by which a clock must drift, and frames over the whole video.
+    clear = np.abs(free.change[:, DRIFT]) > np.maximum(4.0 * off, 0.05)
     if not clear.any():
         return fit
     errors[~clear, DRIFT] = 0.0
@@ -319,7 +314,8 @@ class _Videos:
             ways = np.zeros(errors.shape, bool)
             for what in ("normal", "angle", "scale"):
                 ways[:, PARTS[what]] = True
-            errors[ways & (errors == 0)] = _LOOSE
+            # As a hand measures tilts, log scales and angles: three degrees, 5 %.
+            errors[ways & (errors == 0)] = 0.05
         return errors
 
     def fitted(self, lags: Floats, rough: bool = False, loose: bool = False) -> Adjustment | None:
@@ -330,7 +326,7 @@ class _Videos:
         cameras = self.cameras(footage)
         if cameras is None:
             return None
-        most = _ROUGH_STEPS if rough else STEPS
+        most = 8 if rough else STEPS
         found = adjust(footage, cameras, self.errors(rough, loose), most=most)
         return found if in_common(found) else None
 
@@ -554,10 +550,12 @@ def find_mistake(
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
             # none.
             ranked = [(*one.paired(rig.cameras), one) for one in kind(none, rig, names)]
-            ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
+            # Those of a kind that mend most are tried with all cameras.
+            ranked = sorted(ranked, key=lambda one: one[0])[:16]
             tried = [(one.left(rig, best), best, one) for _, best, one in ranked]
             for now, best, one in sorted(tried, key=lambda one: one[0]):
-                if _MENDED * now < left:
+                # Times by which it has to mend the disagreement of all views together.
+                if 3.0 * now < left:
                     told = learn_lags(one.tracks, rig, one.rates, best, one.clocks)
                     if told.residual <= DISAGREEMENT:
                         return replace(one, lags=told, before=left)

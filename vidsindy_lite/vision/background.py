@@ -40,7 +40,6 @@ LONGEST = 480  # pixels of the longer side of a reduced frame
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
 STRIP = 64  # rows of an image that are sorted at once: what they need stays in the cache
 _OFTEN = 0.1  # share of the samples in which other things differ: more are unrest
-_SHAKY = 0.15  # pixels of displacement above which a camera is not at rest
 _TOO_LARGE = 0.25  # share of the image that no target fills
 
 # Two pixels on both sides of the target's outline, whose coverage is estimated.
@@ -219,7 +218,7 @@ def displacement(background: Floats32, changes: list[Floats32], floor: float) ->
         distance = float(np.linalg.norm(np.linalg.solve(information, g @ d / variance)))
         if distance > 5 * np.sqrt(np.trace(np.linalg.inv(information))):
             farthest = max(farthest, _COARSE * distance)
-    return farthest
+    return farthest if farthest > 0.15 else 0.0  # pixels; of less, a camera is at rest
 
 
 def light(frame: Image | Floats32, background: Image | Floats32, known: Bools) -> Floats32:
@@ -245,7 +244,7 @@ def _unrest(
 ) -> tuple[str, ...]:
     """Why a background model is not the right one: what is not at rest in the samples."""
     doubts = []
-    if displaced > _SHAKY:
+    if displaced:
         doubts.append(
             f"the camera moves, by up to {displaced:.1f} px in the sampled frames; "
             "its motion is part of the track"
@@ -301,7 +300,7 @@ class BackgroundModel:
         self.coarse_background = reduce(self.background, _COARSE).astype(np.float32)
         changes = [one - self.coarse_background for one in coarse]
         displaced = displacement(self.coarse_background, changes, self.coarse_floor)
-        self.camera_rests = displaced <= _SHAKY
+        self.camera_rests = not displaced
         self.unrest = _unrest(self.coarse_background, changes, displaced, self.coarse_floor)
         # The difference is smoothed over about the width of the ring: noise falls to a quarter.
         # Grey levels; above this noise the difference is smoothed before it is thresholded.

@@ -155,18 +155,22 @@ def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
     n = min(len(film.maps), len(lights))
     boxed = None if hint is None else hint.boxed(frames.info.size, n, film.factor)
     seed = boxed and _tightened(seen, boxed)
-    paths, rims = _paths(seen, hint, seed), True
+    paths = _paths(seen, hint, seed)
     if not paths and seed is None:
         return nothing(film.motion, n)
-    rows = paths[0].rows if paths else np.zeros(0, int)
-    # Where it covers its own ground, as long as it is plainer before ground without it.
-    while (boxes := _covering(seen, rows, n, seed, rims=rims)) is not None:
+    boxes = None
+    for k in range(3):  # if it covers its own ground: before ground that is without it
+        covered = _covering(seen, paths[0].rows, n, seed, rims=k == 0) if paths else None
+        if covered is None or (boxes is not None and _same(covered, boxes)):
+            break
+        boxes = covered
         others = sighted(film, boxes)
         plainer = _paths(others[0], hint, seed)
-        if not plainer or plainer[0].rating <= paths[0].rating:
+        # A path that is far less plain there is of what was taken out in its place.
+        if not plainer or plainer[0].rating < 0.5 * paths[0].rating:
             break
-        (seen, lights), paths, rims = others, plainer, False
-        rows = paths[0].rows
+        (seen, lights), paths = others, plainer
+    rows = paths[0].rows if paths else np.zeros(0, int)
     start = seed or _plainest(seen, rows)
     near = rows[np.abs(seen.frame[rows] - start[0]) <= 2]
     pace = np.polyfit(seen.frame[near], seen.place[near], 1)[0] if len(near) > 1 else np.zeros(2)
@@ -281,6 +285,13 @@ def _covering(
     if seed is not None:  # its size is told
         boxes[seen.frame[rows]] = np.column_stack([centre - seed[2] / 2, 0 * centre + seed[2]])
     return boxes
+
+
+def _same(one: Floats, other: Floats) -> bool:
+    """Are most boxes (n, 4) those of before, by a tenth of their size?"""
+    apart = np.abs(one - other).max(axis=1) / other[:, 2:].mean(axis=1)
+    known = np.isfinite(apart)
+    return bool(known.any() and np.median(apart[known]) < 0.1)
 
 
 def _together(
