@@ -130,13 +130,19 @@ def slow(rig, tracks, sampled, rng):
     return given, f"{VIEWS[k]} with 25 frames for 30"
 
 
+def dropped(rig, tracks, sampled, rng):
+    k, at, count = int(rng.integers(3)), int(rng.integers(60, 340)), int(rng.integers(3, 20))
+    given = [np.delete(p, slice(at, at + count), 0) if i == k else p for i, p in enumerate(tracks)]
+    return given, f"{count} frames dropped of {VIEWS[k]} before its frame"
+
+
 MISTAKES = {
-    "swapped": swapped, "mirrored": flipped(0, "mirrored"), "slow": slow,
+    "swapped": swapped, "mirrored": flipped(0, "mirrored"), "slow": slow, "dropped": dropped,
     "upwards": flipped(1, "with v counted upwards"),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("seed", "cause"), [*zip((1, 2, 2, 1), MISTAKES, strict=True)])
+@pytest.mark.parametrize(("seed", "cause"), [*zip((1, 2, 2, 1, 1), MISTAKES, strict=True)])
 def test_a_mistake_is_named(cause, seed):
     rig, tracks, sampled, rng = of_a_law(seed)
     given, what = MISTAKES[cause](rig, tracks, sampled, rng)

@@ -22,9 +22,10 @@ and for slopes that are noise: with a share p of motion in the squares of the sl
 times as large.
 
 **Mistakes** are one of a few, and what is right is known at once: tracks in another order than the
-cameras, a mirrored view, v counted upwards, a video of another frame rate than stated.
-`find_mistake` tries all. Two views at a time, the epipolar equation tells by how much they disagree
-at all whole lags; the mistake that mends that best is tried with all cameras.
+cameras, a mirrored view, v counted upwards, a video of another frame rate than stated, dropped
+frames. `find_mistake` tries all. Two views at a time, the epipolar equation tells by how much they
+disagree at all whole lags; the mistake that mends that best is tried with all cameras. Frames were
+dropped where the best lag of two views jumps.
 """
 
 from __future__ import annotations
@@ -41,10 +42,11 @@ from tqdm import tqdm
 from ..arrays import Floats
 from ..progress import bar
 from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, known_to
-from .calibrate import check_learnable, closed_form
+from .calibrate import check_learnable, closed_form, learn_cameras
 from .clocks import (
     INSTANTS,
     OVERLAP,
+    Curve,
     Footage,
     Lags,
     align,
@@ -68,8 +70,13 @@ _SHOWN = 3  # of the lags that fit equally well
 RATES = ((25, 30), (30, 25), (24, 30), (30, 24), (24, 25), (25, 24), (30, 60), (60, 30))
 """Rates over those stated that are taken for each other."""
 _INSTANTS = 60  # at which two views are compared
+_MISTAKES = 16  # of a kind that mend most, tried with all cameras
+_PART = 0.4  # of the videos, in which their cameras are learned if frames were dropped elsewhere
+_FRAMES = 1500  # of the first video at which a jump of the lag is sought
+_LONGEST = 60  # frames by which it may jump
+_MOST, _PRICE = 8.0, 40.0  # typical misses: the most that one frame counts, and the price of a jump
 _MANY = 6  # cameras, of which only two are taken for each other
-_ROUNDING = 1e-9  # share of a slope that is motion
+_ROUNDING = 1e-9  # scene units, or a share of a slope that is motion
 
 
 def promising_lags(footage: Footage, cameras: Sequence[Camera]) -> list[list[float]]:
@@ -546,7 +553,7 @@ def find_mistake(
         left = none.left(rig, none.paired(rig.cameras)[1])
         if left <= 2 * DISAGREEMENT:
             return None
-        for kind in (_views, _rates):
+        for kind in (_views, _rates, _dropped):
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
             # none.
             ranked = [(*one.paired(rig.cameras), one) for one in kind(none, rig, names)]
@@ -609,3 +616,69 @@ def _rates(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
             rates = np.where(np.arange(count) == i, real / stated, 1.0) * none.rates
             what = f"{names[i]} with {real} frames for {stated} that are supposed"
             yield replace(none, what=what, rates=rates / rates[0])
+
+
+def _dropped(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
+    """Videos of which frames were dropped, each with the clock by which it agrees all the time."""
+    shares = ((0.0, _PART), (1 - _PART, 1.0))  # of a video, in one of which none is dropped, maybe
+    for low, high in shares:
+        rows = [slice(int(low * len(t)), int(high * len(t))) for t in none.tracks]
+        tracks = tuple(t[part] for t, part in zip(none.tracks, rows, strict=True))
+        clocks = tuple(c[part] for c, part in zip(none.clocks, rows, strict=True))
+        part = replace(none, tracks=tracks, clocks=clocks)
+        _, lags = part.paired(rig.cameras)
+        try:
+            learned = learn_cameras(align(tracks, lags, none.rates, clocks), rig)
+        except ValueError:
+            continue
+        curves = tuple(map(Curve, none.tracks, none.clocks))
+        jumps = [_jumps(curves, none.rates, learned.cameras, lags, j) for j in range(1, len(names))]
+        if all(found and found[0][1] < 0 for found in jumps):  # it is the first that lacks some
+            each = {0: [(frame, -lag) for frame, lag in jumps[0]]}
+        else:
+            each = {j: found for j, found in enumerate(jumps, start=1) if found}
+        mended, told = list(none.clocks), []
+        for j, found in each.items():
+            clock = mended[j].copy()
+            lag = 0.0 if j == 0 else lags[j] - (low > 0) * sum(jump for _, jump in found)
+            for frame, jump in found:
+                row = int(np.clip(np.rint((frame - lag) * none.rates[j]), 0, len(clock) - 1))
+                count, lag = round(jump * none.rates[j]), lag + jump
+                clock[row:] += count
+                told.append(f"{count} frames dropped of {names[j]} before its frame {row}")
+            mended[j] = clock
+        if told and all((np.diff(clock) > 0).all() for clock in mended):
+            yield replace(none, what=", ".join(told), clocks=tuple(mended))
+
+
+def _jumps(
+    curves: Sequence[Curve], rates: Floats, cameras: Sequence[Camera], lags: Floats, j: int
+) -> list[tuple[float, float]]:
+    """Where the lag of a video behind the first jumps for good, and by how much.
+
+    The lags that leave the least, each jump at a price, by dynamic programming.
+    """
+    frames = curves[0].clock[:: -(-len(curves[0].clock) // _FRAMES)]
+    tried = lags[j] - lags[0] + np.arange(-_LONGEST, _LONGEST + 1)
+    lines = epipolar_lines(cameras[0], curves[0].at(frames), cameras[j])
+    theirs = curves[j].at((frames - tried[:, None]) * rates[j])
+    design, target = epipolar_rows(lines, cameras[j], theirs)
+    missed = np.abs(target - design @ cameras[j].scaled_turn)
+    usual = missed[_LONGEST][np.isfinite(missed[_LONGEST])]
+    if not usual.size:
+        return []
+    typical = max(float(np.quantile(usual, _PART / 2)), _ROUNDING)
+    # What nobody saw costs as much as what was seen: no lag is better for leaving frames out.
+    cost = np.minimum(missed / typical, _MOST)
+    cost = np.nan_to_num(cost, nan=float(np.minimum(usual / typical, _MOST).mean()))
+    total, before = cost[:, 0], []
+    for now in cost[:, 1:].T:
+        best = int(total.argmin())
+        jumped = total > total[best] + _PRICE
+        before.append(np.where(jumped, best, np.arange(len(total))))
+        total = np.where(jumped, total[best] + _PRICE, total) + now
+    path = [int(total.argmin())]
+    for step in before[::-1]:
+        path.append(int(step[path[-1]]))
+    jumps = np.diff(path[::-1])
+    return [(float(frames[k + 1]), float(jumps[k])) for k in np.flatnonzero(jumps)]
