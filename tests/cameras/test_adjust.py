@@ -109,7 +109,7 @@ def test_how_well_a_camera_is_known():
     place = {"position": (0, 0, 9), "normal": (0, 0, 1)}
     known = known_to(vl.PerspectiveCamera(**place, scale=1, angle=0, **errors))
     two = np.deg2rad(2)
-    expected = [two, two, two, 0.03, *[0.5] * 3, 4, 4, 0.3, 0.3, 0.03, 0.03, 0.2, 0, 0, 0]
+    expected = [two, two, two, 0.03, *[0.5] * 3, 4, 4, 0.3, 0.3, 0.03, 0.03, 0.2, 0, 0]
     np.testing.assert_allclose(known, expected)
     unknown = known_to(vl.PerspectiveCamera(**place))
     assert np.flatnonzero(unknown).tolist() == [2, 3]

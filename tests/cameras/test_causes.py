@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import by_hand, dependent, far_off, room, shot, walk
+from helpers import by_hand, dependent, room, shot, walk
 from scipy.interpolate import make_interp_spline
 
 import vidsindy_lite as vl
@@ -28,12 +28,6 @@ def flawed(rng, what):
         "position": {"position": last.position + 0.05 * last.rows[1]},
         "scale": {"scale": 1.03 * last.scale},
     }
-    if what == "nearness":
-        aimed = [replace(c, normal=c.position) for c in rig.cameras]
-        flat = zip(far_off(rig), aimed, strict=True)
-        return shot(rng, vl.Rig(aimed), FRAMES), vl.Rig(
-            replace(f, normal=c.normal) for f, c in flat
-        )
     return tracks, vl.Rig((*others, replace(last, **change.get(what, {}))))
 
 
@@ -45,7 +39,6 @@ CAUSES = {
     "readout": r"a rolling shutter of all cameras, .* a readout of 0.[2345]",
     "lag": r"a lag of d.mp4 that is off by 0.[23]\d* frames",
     "drift": r"another clock of d.mp4, 0.[789]\d* frames slow over the whole video",
-    "nearness": "perspective, where the cameras are taken as orthographic",
 }
 
 

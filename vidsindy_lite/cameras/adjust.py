@@ -15,8 +15,8 @@ is off (w = (limit / miss)^2, the weight of Geman and McClure's kind).
 A change of a camera is one vector: two tilts of the normal and the in-plane angle (radians), the
 logarithm of the scale, the position along the axes of the view plane and along its normal (scene
 units), the principal point (pixels), k1, k2, p1, p2, the readout of the shutter (frames); and what
-no rig file holds: by how many frames the video is late, by how many more at its end than at its
-start, and how near an orthographic camera is to what it sees (the inverse of its distance).
+no rig file holds: by how many frames the video is late, and by how many more at its end than at its
+start.
 
 Errors of tracks depend on their neighbours. With the slopes J of the residuals r, their noise sigma
 and the information P of measurements, what was fitted has the covariance
@@ -47,7 +47,7 @@ Triggs et al. 2000, "Bundle adjustment: a modern synthesis".
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -72,7 +72,6 @@ from .models import (
 )
 from .rig import FINE, GROSS, Rig, check_views, decimals, disagreement, residuals
 
-_UNTOLD = 1e-15  # of the largest information of any direction: rounding
 PARTS = {
     "normal": [0, 1],
     "angle": [2],
@@ -83,30 +82,24 @@ PARTS = {
     "readout": [13],
     "lag": [14],
     "drift": [15],
-    "nearness": [16],
 }
 """Which components of the vector belong to what."""
 
-SIZE = 17
+SIZE = 16
 STEPS = 60
 """That a search takes at most."""
 _LARGEST = 50.0  # logarithm of a scale: a step that leads there is not taken
 _TANGENTIAL = 0.1  # p1 and p2 of a lens, in units of k1
 _OUTLIER = 6.0  # sigma
-_USED = 0.5  # weight of a frame that holds no outlier
 _PRIOR_NOISE = 0.02  # pixels; no track is better than that beside a measurement
 _ENOUGH = 1e-7  # of sigma, by which a last step moves the images, or ...
 _IN_TIME = 1e-4  # ... if clocks move, whose slopes are rough, and in frames
 _LONGEST = 1.0  # frames: further than that, the slope in a lag does not hold
-_LOST = 0.05  # share of what is seen that a step in time may lead out of the video
 _PROBE = 1e-6  # of a unit: slopes are taken over twice that, and less is no change
 _BESIDE = 2  # frames around an outlier into which interpolation carries a part of it
 _FLAT = 1e-9  # of the largest pivot; smaller ones leave a point where it is
 # Tried in turn, until a step leads downhill: fine where focal length and distance hardly differ.
 _DAMPING = (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2)
-_CHANCE = 1e-6  # of a T that large without a cause
-_TRIED = 5  # of the causes that stand out most
-_SMOOTH = 0.3  # correlation of a residual with the next; that of noise is zero
 LAG, DRIFT = PARTS["lag"][0], PARTS["drift"][0]
 
 
@@ -126,7 +119,8 @@ def fitted_factor(missed: Floats, slopes: Floats, prior: Floats, noise: float) -
     size = np.sqrt(np.diag(square))  # of each parameter: units of pixels, metres and radians
     size[size == 0] = 1.0
     values, ways = np.linalg.eigh(square / np.outer(size, size))
-    told = values > _UNTOLD * values.max(initial=0.0)
+    # Less of the largest information of any direction is rounding.
+    told = values > 1e-15 * values.max(initial=0.0)
     # In the directions of `half`, of length one over sigma, W is the unit matrix.
     half = ways[:, told] / np.sqrt(values[told]) / size[:, None]
     scores = np.einsum("nmk,nm->nk", slopes, missed) @ half
@@ -183,19 +177,6 @@ def known_to(given: Camera) -> Floats:
     return errors
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class NearCamera(OrthographicCamera):
-    """What an orthographic camera would be that is not infinitely far from the point `about`."""
-
-    about: Floats
-    nearness: float = 0.0
-
-    @property
-    def _last_row(self) -> Floats:
-        away = self.nearness * self.normal
-        return np.append(-away, 1 + away @ self.about)
-
-
 def changed(camera: Camera, change: Floats) -> Camera:
     """A calibrated camera after a change; lag and drift are none of its own."""
     part = {name: change[place] for name, place in PARTS.items()}
@@ -214,8 +195,6 @@ def changed(camera: Camera, change: Floats) -> Camera:
         values["distortion"] = frozen(before + step)
     if part["readout"].any():
         values["readout"] = float(np.clip(camera.readout + part["readout"][0], -1, 1))
-    if part["nearness"].any() and isinstance(camera, NearCamera):
-        values["nearness"] = camera.nearness + part["nearness"][0]
     moved = camera.moved(**values) if values else camera
     if part["angle"].any() or part["scale"].any():
         scale, angle = camera.calibration
@@ -305,7 +284,7 @@ class Adjustment:
     @property
     def used(self) -> Bools:
         """Instants that hold no outlier, (n,)."""
-        return self.weights > _USED
+        return self.weights > 0.5
 
     @property
     def free(self) -> Bools:
@@ -328,7 +307,6 @@ class Adjustment:
         sizes = np.ones(self.errors.shape)
         sizes[:, PARTS["position"]] = self.reach
         sizes[:, PARTS["principal point"]] = [[camera.image_size[0]] for camera in self.start]
-        sizes[:, PARTS["nearness"]] = 1 / self.reach
         return sizes
 
     @cached_property
@@ -468,7 +446,8 @@ def _downhill(state: Adjustment) -> tuple[Adjustment | None, float]:
     def cost(other: Adjustment) -> float:
         """What is to be smallest; infinite if points that were seen before would not be."""
         lost = ~np.isfinite(other.misses[seen])
-        if lost.any() and lost.mean() > (_LOST if state.timed else 0.0):
+        # Share of what is seen that a step in time may lead out of the video.
+        if lost.any() and lost.mean() > (0.05 if state.timed else 0.0):
             return np.inf
         squares = np.nansum(np.where(seen, other.misses, 0.0) ** 2, axis=1)
         off = prior * other.change[free]
@@ -532,8 +511,6 @@ class Cause:
             "lag": f"a lag of {names[i]} that is off by {change[PARTS['lag']][0]:.2f} frames",
             "drift": f"another clock of {names[i]}, {abs(change[PARTS['drift']][0]):.2g} frames "
             f"{'slow' if change[PARTS['drift']][0] > 0 else 'fast'} over the whole video,",
-            "nearness": "perspective, where the cameras are taken as orthographic, for "
-            f"{one} a distance of {1 / max(abs(change[PARTS['nearness']][0]), 1e-12):.3g},",
         }
         return parts[self.what]
 
@@ -550,19 +527,17 @@ def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Cause | None:
     """
     views = check_views(tracks, learned)
     errors = np.array([known_to(camera) for camera in given.cameras])
-    points, _ = intersect(learned.cameras, views)
-    seen = np.isfinite(points).all(axis=1)
-    if not seen.any():
+    if not np.isfinite(intersect(learned.cameras, views)[0]).any():
         return None
     far = smooth(tracks, learned) and max(disagreement(tracks, learned)) > GROSS
-    start = [_near(camera, points[seen].mean(axis=0)) for camera in learned.cameras]
-    footage = Footage.of(tracks)
+    footage, start = Footage.of(tracks), learned.cameras
     near = adjust(footage, start, np.where(errors > 0, errors, np.inf), most=0)
     causes = [cause for cause in _causes(near) if (cause.freed & (errors == 0)).any()]
     told = [_evidence(near, errors[near.free] > 0, cause.freed[near.free]) for cause in causes]
     # Where views are far apart, and no noise makes it, no test is needed.
     rank = [explained if far else evidence for evidence, explained in told]
-    likely = [causes[k] for k in np.argsort(rank)[::-1][:_TRIED] if rank[k] > (0 if far else 1)]
+    # The five that stand out most.
+    likely = [causes[k] for k in np.argsort(rank)[::-1][:5] if rank[k] > (0 if far else 1)]
     tried = [
         replace(cause, found=adjust(footage, start, np.where(cause.freed, np.inf, errors)))
         for cause in likely
@@ -576,7 +551,8 @@ def smooth(tracks: Sequence[Floats], learned: Rig) -> bool:
     both = np.isfinite(missed[1:]) & np.isfinite(missed[:-1])
     limit = np.nanquantile(np.abs(missed), TRIMMED) if both.any() else 0.0
     before, after = (np.clip(part[both], -limit, limit) for part in (missed[:-1], missed[1:]))
-    return bool(before @ after > _SMOOTH * np.sqrt((before @ before) * (after @ after)))
+    # Correlation of a residual with the next; that of noise is zero.
+    return bool(before @ after > 0.3 * np.sqrt((before @ before) * (after @ after)))
 
 
 def _causes(near: Adjustment) -> list[Cause]:
@@ -601,17 +577,7 @@ def _causes(near: Adjustment) -> list[Cause]:
     found.append(cause("readout", every, PARTS["readout"]))
     if pinholes:
         found.append(cause("distortion", pinholes, lens))
-    if flat:  # the scale is then that of another distance
-        found.append(cause("nearness", flat, PARTS["nearness"] + PARTS["scale"]))
     return found
-
-
-def _near(camera: Camera, about: Floats) -> Camera:
-    """The same camera, ready to be not infinitely far if it is orthographic."""
-    if not isinstance(camera, OrthographicCamera):
-        return camera
-    values = {part.name: getattr(camera, part.name) for part in fields(camera)}
-    return NearCamera(about=about, **values)
 
 
 def _sizes(rows: Floats) -> Floats:
@@ -639,5 +605,6 @@ def _evidence(near: Adjustment, free: Bools, wanted: Bools) -> tuple[float, floa
     rest_degrees = degrees - rank + 1
     if explained < FINE or rest_degrees <= 0:
         return 0.0, explained
-    chance = float(fdtri(rank, rest_degrees, 1 - _CHANCE))
+    # The chance of a T that large without a cause.
+    chance = float(fdtri(rank, rest_degrees, 1 - 1e-6))
     return float(score @ score) * rest_degrees / (chance * rank * degrees), explained

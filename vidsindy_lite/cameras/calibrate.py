@@ -46,11 +46,9 @@ from .models import (
 from .rig import Rig, check_calibrated, check_seen, check_views
 from .unmeasured import posed
 
-_TOO_FAR = 5.0  # standard errors that a measurement may be off
 _TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1
 # A frame that is missed by more than so many robust standard deviations holds an outlier.
 _OUTLIER = 8.0
-_ROUNDS = 20  # of weighing equations, for the least absolute misses
 # Motion must tell by so many times the misfit in countless frames, and over sqrt(n) more in n.
 _TELLING, _FEW = 1.45, 8.0
 
@@ -93,7 +91,7 @@ def _epipolar(tracks: Sequence[Floats], cameras: Sequence[Camera], i: int) -> Eq
 def _without_outliers(every: Equations, scale: float) -> Equations:
     """The frames of which the fit of the least absolute misses, in pixels, misses none by far."""
     missed = np.ones(len(every.target))
-    for _ in range(_ROUNDS):
+    for _ in range(20):
         root = np.sqrt(np.maximum(missed, ROUNDING))
         solution = np.linalg.lstsq(every.design / root[:, None], every.target / root)[0]
         missed = np.abs(every.design @ solution - every.target) / scale
@@ -350,7 +348,8 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
         )
     measured = (errors > 0) & np.isfinite(errors)
     off = np.where(measured, np.abs(found.change) / np.where(measured, errors, 1.0), 0.0)
-    if off.max() > _TOO_FAR:
+    # Standard errors that a measurement may be off.
+    if off.max() > 5.0:
         i, part = np.unravel_index(off.argmax(), off.shape)
         what = next(name for name, place in PARTS.items() if part in place)
         doubts += (

@@ -27,10 +27,7 @@ OVERLAP = 0.5
 _NEAR = 4.0  # frames within which a search for lags goes to the best
 _FARTHEST = 1e9  # frames by which a video may start later; and ...
 _FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
-_WIDEST = 2.5  # frames between two that a track is interpolated from: one of them may be dropped
 _ROUNDING = 1e-6  # frames; times that are closer to even ones are even
-_SAME_RATE = 0.01  # relative difference of frame rates that are the same
-_SAME_TIME = 0.25  # frames by which given times may differ from those of an uneven file
 
 
 @dataclass(frozen=True)
@@ -180,7 +177,8 @@ class Curve:
         low = np.searchsorted(self.clock, within, "right") - 1
         high = np.searchsorted(self.clock, within, "left")
         values = np.where((low == high)[..., None], self.track[low], self._spline(within))
-        near = self.clock[high] - self.clock[low] <= _WIDEST
+        # Frames between two that it is interpolated from: one of them may be dropped.
+        near = self.clock[high] - self.clock[low] <= 2.5
         values[~((frames == within) & self.shown[low] & self.shown[high] & near)] = np.nan
         return values
 
@@ -392,7 +390,8 @@ class Clock:
                     f"got {rates.tolist()}"
                 )
             return cls(frames[0] / rates[0], rates / rates[0], frames)
-        if told.any() and np.ptp(rates[told]) > _SAME_RATE * rates[told].min():
+        # Relative difference of frame rates that are the same.
+        if told.any() and np.ptp(rates[told]) > 0.01 * rates[told].min():
             raise ValueError(
                 "t: may be given, as --fps may, only for videos of one frame rate, got files that "
                 f"state {', '.join(f'{rate:g}' for rate in rates)}: leave it out, so that the "
@@ -421,7 +420,8 @@ def _check_uneven(times: Floats, frames: Floats) -> None:
         return
     scaled = (times - times[0]) / (times[-1] - times[0]) * frames[-1]
     k = int(np.abs(scaled - frames).argmax())
-    if abs(scaled[k] - frames[k]) > _SAME_TIME:
+    # Frames by which they may differ.
+    if abs(scaled[k] - frames[k]) > 0.25:
         raise ValueError(
             "t: must fit the times that the first video's file states, as frames were dropped or "
             f"taken at uneven times, got {times[k] - times[0]:g} after the first for frame {k}: "

@@ -4,10 +4,9 @@ Two cameras see one point only if they look at the same instant; otherwise their
 each other, and no camera can mend it. So the lags are those of the smallest reprojection error, and
 are found in three steps:
 
-1. pair by pair, with a calibrated camera: the epipolar equation (`rig.epipolar_lines`) is
-   linear in what is unknown of the other camera, and is solved at all whole lags at once. It is
-   solved a second time with a shift of the other image, which takes up most of what a badly
-   measured normal or position does;
+1. pair by pair, with a calibrated camera: the epipolar equation (`models.epipolar_lines`) is
+   linear in what is unknown of the other camera, and is solved at all whole lags at once; with a
+   shift of the other image, which takes up most of what a badly measured normal or position does;
 2. all cameras together (`adjust`), in some of the frames, from the most promising whole lags;
 3. from the best of these, in all frames.
 
@@ -62,23 +61,15 @@ from .models import TRIMMED, Camera, at_once, epipolar_lines, epipolar_rows, mis
 from .rig import ALIKE, BETTER, DISAGREEMENT, FINE, GROSS, Rig, check_seen
 from .unmeasured import posed
 
-_BLOCK = 200_000  # pairs of a lag and an instant at a time
-_PROMISING = 4  # lags of each camera, with and without a shift
-_BETTER_PART = 0.7  # of all frames or equations, in which there is no outlier
-_APART = 1.0  # frames; lags closer than that are one and the same
+_PROMISING = 8  # lags of each camera
 _PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
-_CLEAR = 4.0  # standard errors by which a clock must drift, ...
-_ENOUGH = 0.05  # ... and frames over the whole video
 _TIMES = LAG, DRIFT
 BLURRED = 0.5
 """Standard error of a lag, in frames, beyond which it counts as unknown."""
 
-_ROUGH_STEPS = 8  # of the second step
 _SHOWN = 3  # of the lags that fit equally well
-_LOOSE = 0.05  # of tilts, log scales and angles that a hand measured: three degrees, 5 %
 RATES = ((25, 30), (30, 25), (24, 30), (30, 24), (24, 25), (25, 24), (30, 60), (60, 30))
 """Rates over those stated that are taken for each other."""
-_MENDED = 3.0  # times by which a mistake has to mend the disagreement of all views together
 _INSTANTS = 60  # at which two views are compared
 _MISTAKES = 16  # of a kind that mend most, tried with all cameras
 _PART = 0.4  # of the videos, in which their cameras are learned if frames were dropped elsewhere
@@ -91,17 +82,13 @@ _ROUNDING = 1e-9  # scene units, or a share of a slope that is motion
 
 def promising_lags(footage: Footage, cameras: Sequence[Camera]) -> list[list[float]]:
     """Whole lags of each camera behind the first calibrated one, the most promising first."""
-    both = (lag_misses(footage, cameras, shift=shift) for shift in (False, True))
-    found = []
-    for without, shifted in zip(*both, strict=True):
-        choices = [lag for misses in (without, shifted) for lag in dips(*misses)[:_PROMISING]]
-        found.append([*dict.fromkeys(choices)] or [0.0])
+    found = [dips(*misses)[:_PROMISING] or [0.0] for misses in lag_misses(footage, cameras)]
     found.insert(first_known(cameras), [0.0])
     return found
 
 
 def lag_misses(
-    footage: Footage, cameras: Sequence[Camera], most: int = INSTANTS, shift: bool = False
+    footage: Footage, cameras: Sequence[Camera], most: int = INSTANTS
 ) -> Iterator[tuple[Floats, Floats]]:
     """Of each camera but the first calibrated one, all whole lags (k,) and `pair_missed` at these.
 
@@ -116,13 +103,13 @@ def lag_misses(
         margin = OVERLAP * min(ends[known], ends[other])
         lags = np.arange(np.ceil(margin - ends[other]), ends[known] - margin + 1)
         first, second = cameras[known], cameras[other]
-        placed = first.is_placed and second.is_placed
         lines = epipolar_lines(first.somewhere, curves[known].at(frames), second.somewhere)
         instants, rate = frames / footage.rates[known], footage.rates[other]
         missed = []
-        for block in np.array_split(lags, int(np.ceil(lags.size * frames.size / _BLOCK))):
+        # So many pairs of a lag and an instant at a time.
+        for block in np.array_split(lags, int(np.ceil(lags.size * frames.size / 200_000))):
             theirs = curves[other].at((instants - block[:, None]) * rate)
-            missed.append(pair_missed(second, placed, lines, theirs, shift))
+            missed.append(pair_missed(second, lines, theirs))
         yield lags, np.concatenate(missed)
 
 
@@ -131,20 +118,15 @@ def first_known(cameras: Sequence[Camera]) -> int:
     return next(i for i, camera in enumerate(cameras) if camera.is_calibrated)
 
 
-def pair_missed(
-    other: Camera, placed: bool, lines: tuple[Floats, Floats], theirs: Floats, shift: bool
-) -> Floats:
+def pair_missed(other: Camera, lines: tuple[Floats, Floats], theirs: Floats) -> Floats:
     """By how much its pixels, (k, n, 2), miss the epipolar lines at best, (k,), scene units rms.
 
-    `placed` says whether both positions are known, `shift` whether the image may be shifted. One
-    instant in ten is left out. Infinite where too few are left.
+    Its image may be shifted. One instant in ten is left out. Infinite where too few are left.
     """
     design, target = epipolar_rows(lines, other, theirs)
     target = target - design @ other.scaled_turn
-    design = design[..., : 0 if other.is_calibrated else 2]
-    extra = lines[0] if shift else np.ones((len(lines[0]), 1)) if not placed else lines[0][:, :0]
-    extra = np.broadcast_to(extra, (*target.shape, extra.shape[1]))
-    design = np.concatenate((design, extra), axis=-1)
+    shift = np.broadcast_to(lines[0], design.shape)
+    design = shift if other.is_calibrated else np.concatenate((design, shift), axis=-1)
     seen = np.isfinite(target) & np.isfinite(design).all(axis=-1)
     design, target = np.where(seen[..., None], design, 0), np.where(seen, target, 0)
     fits = seen
@@ -161,7 +143,8 @@ def pair_missed(
 
 def score(fit: Adjustment) -> float:
     """What is left, if errors are normal but for some outliers: by the better part of them."""
-    return fit.left(_BETTER_PART)
+    # The share of them in which there is no outlier.
+    return fit.left(0.7)
 
 
 def in_common(fit: Adjustment) -> bool:
@@ -186,7 +169,8 @@ def agrees(fit: Adjustment) -> bool:
 
 def near(fit: Adjustment, lags: Floats) -> bool:
     """Whether its lags are those."""
-    return bool(np.abs(fit.footage.lags - lags).max() < _APART)
+    # Frames; lags closer than that are one and the same.
+    return bool(np.abs(fit.footage.lags - lags).max() < 1.0)
 
 
 def shares(fit: Adjustment) -> Floats:
@@ -227,7 +211,8 @@ def drifted(fit: Adjustment) -> Adjustment:
     if not in_common(free):
         return fit
     off[1:] = np.sqrt(np.diag(covariance(free)))[len(off) - 1 :]
-    clear = np.abs(free.change[:, DRIFT]) > np.maximum(_CLEAR * off, _ENOUGH)
+    # Standard errors by which a clock must drift, and frames over the whole video.
+    clear = np.abs(free.change[:, DRIFT]) > np.maximum(4.0 * off, 0.05)
     if not clear.any():
         return fit
     errors[~clear, DRIFT] = 0.0
@@ -337,7 +322,8 @@ class _Videos:
             ways = np.zeros(errors.shape, bool)
             for what in ("normal", "angle", "scale"):
                 ways[:, PARTS[what]] = True
-            errors[ways & (errors == 0)] = _LOOSE
+            # As a hand measures tilts, log scales and angles: three degrees, 5 %.
+            errors[ways & (errors == 0)] = 0.05
         return errors
 
     def fitted(self, lags: Floats, rough: bool = False, loose: bool = False) -> Adjustment | None:
@@ -348,7 +334,7 @@ class _Videos:
         cameras = self.cameras(footage)
         if cameras is None:
             return None
-        most = _ROUGH_STEPS if rough else STEPS
+        most = 8 if rough else STEPS
         found = adjust(footage, cameras, self.errors(rough, loose), most=most)
         return found if in_common(found) else None
 
@@ -585,7 +571,8 @@ def find_mistake(
                 for lags in (start, best)
             ]
             for now, best, one in sorted(tried, key=lambda one: one[0]):
-                if _MENDED * now < left:
+                # Times by which it has to mend the disagreement of all views together.
+                if 3.0 * now < left:
                     told = learn_lags(one.tracks, rig, one.rates, best, one.clocks)
                     if told.agree and told.residual <= 2 * DISAGREEMENT:
                         others = [o.what for n, _, o in tried if n <= ALIKE * max(now, FINE)]

@@ -43,14 +43,11 @@ from .models import AffineCamera, PerspectiveCamera, at_once, missed
 from .rig import ALIKE, BETTER, FINE, GROSS, Rig, check_views
 
 _FEWEST = 8  # frames in common of a pair
-_UNKNOWN = 45.0  # degrees
 _VIEWS = np.geomspace(2, 90, 15)  # degrees across an image: what lenses have
-_ANY = 0.5  # error of the logarithm of an unknown focal length
 _STARTS, _LAGS = 4, 10  # of all, from which a search begins
 _STEPS = 30  # of each such search
 _WIDE = 0.01  # OpenCV refuses points that are close together, in whatever unit
 _FLAT = 1e-3  # of the largest axis: what rounding leaves of a motion in a plane
-_TOLD = 25.0  # chi-squared by which the mirror image must be worse
 
 _EITHER_HAND = (
     "whether the path is the true one or its mirror image cannot be told, as the cameras are "
@@ -58,7 +55,6 @@ _EITHER_HAND = (
 )
 _Pose = tuple[NDArray[Any], NDArray[Any]]  # OpenCV's rotation and shift
 _PROMISING = 20  # lags of each view
-_MOVES = 5.0  # times what is left by which a target must move, rms, in every view
 _NOTE = (
     "nothing is known of the cameras: the path is known but for an affine map, its axes are those "
     "of its spread, largest first; of a linear law frequencies and dampings do not depend on it"
@@ -144,7 +140,8 @@ def _lens(camera: PerspectiveCamera, view: float) -> PerspectiveCamera:
     if camera.scale is not None:
         return camera
     scale = 2 * np.tan(np.deg2rad(view) / 2) / camera.image_size[0]
-    return camera.moved(scale=float(scale), angle=0.0, scale_error=_ANY)
+    # The error of the logarithm of an unknown focal length.
+    return camera.moved(scale=float(scale), angle=0.0, scale_error=0.5)
 
 
 def _around(
@@ -248,7 +245,8 @@ def _homed(
 def _mirrored(best: Adjustment, other: Adjustment) -> bool:
     """Whether other cameras explain the tracks as well, by the mirror image of the path."""
     left = [np.nansum(fit.weights[:, None] * fit.misses**2) for fit in (best, other)]
-    if left[1] - left[0] > _TOLD * best.noise**2:
+    # Chi-squared by which the mirror image must be worse.
+    if left[1] - left[0] > 25.0 * best.noise**2:
         return False
     both = np.isfinite(best.points + other.points).all(axis=1)
     x, y = (fit.points[both] - fit.points[both].mean(axis=0) for fit in (best, other))
@@ -268,9 +266,7 @@ def _framed(rig: Rig, fit: Adjustment, mirrored: bool) -> Rig:
         replace(camera, position=unit * (np.asarray(camera.position) - middle))
         for camera in cameras
     )
-    loose = [
-        replace(camera, position_error=unit * apart, normal_error=_UNKNOWN) for camera in others
-    ]
+    loose = [replace(camera, position_error=unit * apart, normal_error=45.0) for camera in others]
     doubts = (_EITHER_HAND,) if mirrored else ()
     return Rig((first, *loose), doubts, _note(rig))
 
@@ -340,7 +336,8 @@ def factorised(
     of_views = [
         (part**2).reshape(len(every), count, 2).mean(axis=(0, 2)) for part in (moved, missed)
     ]
-    if not (of_views[0] > _MOVES**2 * of_views[1]).all():
+    # Times what is left by which a target must move, rms, in every view.
+    if not (of_views[0] > 5.0**2 * of_views[1]).all():
         return None
     cameras = [
         AffineCamera.of(

@@ -24,7 +24,7 @@ that is how `view_distances` tells the one from the other.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -40,7 +40,6 @@ LONGEST = 480  # pixels of the longer side of a reduced frame
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
 STRIP = 64  # rows of an image that are sorted at once: what they need stays in the cache
 _OFTEN = 0.1  # share of the samples in which other things differ: more are unrest
-_SHAKY = 0.15  # pixels of displacement above which a camera is not at rest
 _TOO_LARGE = 0.25  # share of the image that no target fills
 
 # Two pixels on both sides of the target's outline, whose coverage is estimated.
@@ -219,7 +218,7 @@ def displacement(background: Floats32, changes: list[Floats32], floor: float) ->
         distance = float(np.linalg.norm(np.linalg.solve(information, g @ d / variance)))
         if distance > 5 * np.sqrt(np.trace(np.linalg.inv(information))):
             farthest = max(farthest, _COARSE * distance)
-    return farthest
+    return farthest if farthest > 0.15 else 0.0  # pixels; of less, a camera is at rest
 
 
 def light(frame: Image | Floats32, background: Image | Floats32, known: Bools) -> Floats32:
@@ -245,7 +244,7 @@ def _unrest(
 ) -> tuple[str, ...]:
     """Why a background model is not the right one: what is not at rest in the samples."""
     doubts = []
-    if displaced > _SHAKY:
+    if displaced:
         doubts.append(
             f"the camera moves, by up to {displaced:.1f} px in the sampled frames; "
             "its motion is part of the track"
@@ -301,7 +300,7 @@ class BackgroundModel:
         self.coarse_background = reduce(self.background, _COARSE).astype(np.float32)
         changes = [one - self.coarse_background for one in coarse]
         displaced = displacement(self.coarse_background, changes, self.coarse_floor)
-        self.camera_rests = displaced <= _SHAKY
+        self.camera_rests = not displaced
         self.unrest = _unrest(self.coarse_background, changes, displaced, self.coarse_floor)
         # The difference is smoothed over about the width of the ring: noise falls to a quarter.
         # Grey levels; above this noise the difference is smoothed before it is thresholded.
@@ -451,27 +450,6 @@ def _shape(alpha: Floats, u: Floats, v: Floats) -> Floats:
 # ------------------------------------------------------------------------------------------- track
 
 
-def track_blobs(model: BackgroundModel, frames: Iterable[Image]) -> Iterator[Blob | None]:
-    """The target in each frame (None if not found): near its predicted position, else anywhere."""
-    position, velocity, age = None, np.zeros(2), 0
-    for frame in frames:
-        blob = None
-        if position is not None and age < 3:
-            radius = np.sqrt(model.area / np.pi)
-            half = 2 * radius + 8 + 0.5 * np.abs(velocity).max()
-            blob = model.measure(frame, position + (age + 1) * velocity, half)
-        if blob is None:
-            near = model.search(frame)
-            blob = near and model.measure(frame, *near)
-        if blob is None or blob.shape is None:
-            age += 1
-        else:
-            if position is not None:
-                velocity = (blob.centroid - position) / (age + 1)
-            position, age = blob.centroid, 0
-        yield blob
-
-
 def view_distances(blobs: Sequence[Blob | None]) -> Floats:
     """How far each view (None = not found) is from those of the whole target, (n,).
 
@@ -503,7 +481,10 @@ def whole_blobs(model: BackgroundModel, frames: Iterable[Image]) -> tuple[Floats
     And whether outlines are too blurred to tell whole views by: where these are blurred, by motion
     or a codec, and many views are left out, it is by the blur that they differ.
     """
-    blobs = list(track_blobs(model, frames))
+    blobs = []
+    for frame in frames:
+        near = model.search(frame)
+        blobs.append(model.measure(frame, *near) if near else None)
     distance = view_distances(blobs)
     # A view beside a distant one may be cut a little: it must be twice as close.
     whole = ~ndimage.binary_propagation(distance > 1, mask=distance > 0.5)

@@ -17,15 +17,6 @@ A motion can be wrong with small errors: before a smooth wall nothing but the ta
 and then the target's motion is taken for the camera's. But the plate that it makes, and the one of
 a camera at rest, each say what all frames look like in all of their parts, and what moves on its
 own is in few of these: so a motion is taken only if it explains the frames better than rest does.
-
-Two frames of a sky share little but noise, and corners of noise tell no motion. But the median of
-many frames of a camera that trembles is that sky nearly without noise, only a little blurred, and
-each frame laid on it tells its own small motion. Whether that is one is for the
-halves of the image to say: if the camera moves, both move alike; noise, a codec's errors and what
-moves on its own are not the same in both. By how much the halves differ also says how exact the
-motion is: errors of a codec and of the plate itself reach over many pixels, which no pixel's misfit
-tells. What a codec of few bits leaves where it was, instead of moving it along, both tell alike,
-though.
 """
 
 from __future__ import annotations
@@ -516,87 +507,17 @@ def _gain(one: Floats32, other: Floats32) -> float:
     return float(ratios[aside : len(ratios) - aside].mean())
 
 
-def trembling(frames: Reel, samples: Image) -> CameraMotion | None:
-    """The motion of a camera that trembles, None if that is not sure; `samples` are reduced."""
-    views = [Look(sample).levels for sample in samples]
-    maps = np.tile(np.eye(3), (len(samples), 1, 1))
-    # Each of the samples as they were laid on the one before.
-    for _ in range(2):
-        image, known = Plate(samples, maps, np.ones(len(samples), bool)).seen_from(np.eye(3))
-        ground = [_limited(level, known) for level in Look(image).grounds]
-        laid = [_laid(ground, view, here) for view, here in zip(views, maps, strict=True)]
-        # Reduced pixels to which a motion must be known.
-        if np.median([one.error for one in laid]) > 0.5:
-            return None
-        maps[:] = np.linalg.inv([one.map for one in laid])
-        # Reduced pixels: what moves farther blurs the first plate too much.
-        if displacement(maps, samples.shape[2:0:-1]).max() > 8.0:
-            return None
-    alike, error = _halves(ground, views, maps)
-    # Correlation of what two halves of an image tell, if both move alike.
-    if alike < 0.5:
-        return None
-    usual = np.sqrt(np.mean([one.error**2 for one in laid if np.isfinite(one.error)]))
-    # All frames laid on the ground, and so on the first; errors are larger than pixels tell.
-    laid = [_laid(ground, Look(frame).levels, np.eye(3)) for frame in frames]
-    places = np.asarray(np.linalg.inv([one.map for one in laid]), float)
-    errors = np.array([one.error for one in laid])
-    sure = max(error / usual, 1.0) * np.hypot(errors, errors[0])
-    sure[0] = 0.0
-    return CameraMotion.of(np.linalg.inv(places[0]) @ places, sure, frames.factor)
-
-
-def _limited(level: Ground, where: Bools) -> Ground:
-    """A level that tells nothing outside some part (h, w) of the image."""
-    size = level.grey.shape[1::-1]
-    share = cv2.resize(where.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    inner = cv2.erode(np.asarray(share > 0.99, np.uint8), np.ones((5, 5))) > 0
-    return level._replace(share=level.share * inner)
-
-
-def _laid(ground: list[Ground], view: list[Floats32], here: Floats) -> Aligned:
-    """The map of the ground to a view, from one the other way round that is about right."""
-    back = np.asarray(np.linalg.inv(here), float)
-    return align(ground, view, back) or Aligned(back, np.inf)
-
-
-def _halves(
-    ground: list[Ground], views: Sequence[list[Floats32]], maps: Floats
-) -> tuple[float, float]:
-    """The correlation of the motions that two halves of the image tell, and the error of both.
-
-    A half are two quarters that touch in the middle, which tell all of a motion, and what moves on
-    its own is in one half at a time. The error is that of the places of their mean, rms, per axis.
-    """
-    height, width = ground[0].grey.shape
-    left, upper = np.arange(width) < width / 2, (np.arange(height) < height / 2)[:, None]
-    size = 2 * np.array([width, height])
-    grid = size * np.array([[u, v] for u in (0.2, 0.5, 0.8) for v in (0.2, 0.5, 0.8)])
-    told = []
-    for half in (left == upper, left != upper):
-        part = [_limited(level, half) for level in ground]
-        laid = [_laid(part, view, here) for view, here in zip(views, maps, strict=True)]
-        ends = np.array([carry(one.map, grid).ravel() for one in laid])
-        told.append(ends - np.median(ends, axis=0))
-    one, other = told
-    alike = (one * other).sum() / np.sqrt((one**2).sum() * (other**2).sum())
-    return float(alike), float(np.sqrt(np.mean((one - other) ** 2)) / 2)
-
-
 def camera_motion(frames: Reel, small: Image, sampled: Ints) -> tuple[CameraMotion, bool]:
     """The camera's motion, and whether that is sure.
 
     If the sampled frames do not tell that the camera is at rest, all frames are asked where they
-    lie: one after the other, and, if that is not exact, all on what they show together.
+    lie, one after the other.
     """
     still = stands_still(small)
-    if still is True:
-        return at_rest(frames.info.frames), True
-    motion = None if still is None else _followed(frames, small, sampled)
-    if motion is None or np.median(motion.errors) >= LOOSE:
-        found = [one for one in (motion, trembling(frames, small)) if one is not None]
-        motion = min(found, key=lambda one: np.median(one.errors), default=None)
-    return (at_rest(frames.info.frames), rests(small)) if motion is None else (motion, True)
+    motion = _followed(frames, small, sampled) if still is False else None
+    if motion is not None:
+        return motion, True
+    return at_rest(frames.info.frames), still is True or rests(small)
 
 
 def _followed(frames: Reel, small: Image, sampled: Ints) -> CameraMotion | None:

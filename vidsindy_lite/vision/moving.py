@@ -151,26 +151,26 @@ def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
     `samples` are frames spread evenly over the film, see `sample_frames`.
     """
     film = Film.of(frames, samples)
-    n, boxes, seed = len(film.maps), None, None
-    for _ in range(4):  # of a target that covers its own ground, until the ground is without it
-        seen, lights = sighted(film, boxes)
-        n = min(n, len(lights))
-        if hint is not None and boxes is None:
-            boxed = hint.boxed(frames.info.size, n, film.factor)
-            seed = boxed and _tightened(seen, boxed)
-        paths = _paths(seen, hint, seed)
-        if not paths and seed is None:
-            return nothing(film.motion, n)
-        rows = paths[0].rows if paths else np.zeros(0, int)
-        rims = boxes is None or len(rows) < n / 2
-        covered = _covering(seen, rows, n, seed, rims=rims)
-        if covered is not None and boxes is not None and rims:
-            covered = _around(covered, boxes)
+    seen, lights = sighted(film)
+    n = min(len(film.maps), len(lights))
+    boxed = None if hint is None else hint.boxed(frames.info.size, n, film.factor)
+    seed = boxed and _tightened(seen, boxed)
+    paths = _paths(seen, hint, seed)
+    if not paths and seed is None:
+        return nothing(film.motion, n)
+    boxes = None
+    for k in range(3):  # if it covers its own ground: before ground that is without it
+        covered = _covering(seen, paths[0].rows, n, seed, rims=k == 0) if paths else None
         if covered is None or (boxes is not None and _same(covered, boxes)):
             break
         boxes = covered
-    if seed is None and boxes is not None and _turns_only(seen, rows):
-        return nothing(film.motion, n)
+        others = sighted(film, boxes)
+        plainer = _paths(others[0], hint, seed)
+        # A path that is far less plain there is of what was taken out in its place.
+        if not plainer or plainer[0].rating < 0.5 * paths[0].rating:
+            break
+        (seen, lights), paths = others, plainer
+    rows = paths[0].rows if paths else np.zeros(0, int)
     start = seed or _plainest(seen, rows)
     near = rows[np.abs(seen.frame[rows] - start[0]) <= 2]
     pace = np.polyfit(seen.frame[near], seen.place[near], 1)[0] if len(near) > 1 else np.zeros(2)
@@ -228,7 +228,7 @@ def _paths(
         if not (here & near & alike).any():
             return []
         quality = np.where(here, np.where(near & alike, seen.quality + TOLD, -TOLD), seen.quality)
-        return [Motion(best_path(seen._replace(quality=quality))[0], np.inf)]
+        return [Motion(*best_path(seen._replace(quality=quality)))]
     liked = seen
     if hint is not None and hint.colour is not None:
         liked = seen._replace(quality=seen.quality * hint.likeness(seen.colour, seen.behind))
@@ -287,24 +287,11 @@ def _covering(
     return boxes
 
 
-def _around(one: Floats, other: Floats) -> Floats:
-    """Boxes (n, 4) around two, or around the one that is known."""
-    low = np.fmin(one[:, :2], other[:, :2])
-    high = np.fmax(one[:, :2] + one[:, 2:], other[:, :2] + other[:, 2:])
-    return np.hstack([low, high - low])
-
-
 def _same(one: Floats, other: Floats) -> bool:
     """Are most boxes (n, 4) those of before, by a tenth of their size?"""
     apart = np.abs(one - other).max(axis=1) / other[:, 2:].mean(axis=1)
     known = np.isfinite(apart)
     return bool(known.any() and np.median(apart[known]) < 0.1)
-
-
-def _turns_only(seen: Candidates, rows: Ints) -> bool:
-    """Does a thing that covers its own ground leave its place by less than a tenth of its size?"""
-    low, high = np.percentile(seen.place[rows], [5, 95], axis=0)
-    return bool(np.linalg.norm(high - low) < 0.1 * np.median(seen.size[rows]))
 
 
 def _together(

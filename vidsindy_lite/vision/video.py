@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from av.video.stream import VideoStream
 
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".ppm", ".pgm"})
-_ROOM = 300_000_000  # bytes of frames that are kept, whole or reduced
 
 # When a packet's frame is shown, in ticks of the stream, and whether decoding can begin there.
 Shown = tuple[int | None, bool]
@@ -667,7 +666,8 @@ class Reel:
         width, height = self.info.size
         self.factor = -(-max(width, height) // longest) if longest else 1
         self.whole = self if self.factor == 1 else Reel(path)
-        self.few = 3 * width * height * self.info.frames <= _ROOM * self.factor**2
+        # Bytes of frames that are kept, whole or reduced.
+        self.few = 3 * width * height * self.info.frames <= 300_000_000 * self.factor**2
         self._kept: list[Image] | None = None
 
     def __iter__(self) -> Iterator[Image]:
