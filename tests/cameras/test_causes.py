@@ -13,7 +13,7 @@ from vidsindy_lite import study
 from vidsindy_lite.cameras import explain, find_mistake, learn_cameras
 
 NAMES = ["a.mp4", "b.mp4", "c.mp4", "d.mp4"]
-FRAMES = np.arange(500)
+FRAMES = np.arange(300)
 
 
 def flawed(rng, what):
