@@ -58,7 +58,7 @@ def test_the_cause_is_named(what):
     assert re.match(CAUSES[what], found.text(NAMES))
     assert found.left < 1.5  # what half a pixel of noise leaves
     if what == "normal":
-        told = vl.observe_tracks(tracks, rig, FRAMES / 30, names=NAMES)
+        told = vl.observe_tracks(tracks, rig, FRAMES / 30, lags="synchronous", names=NAMES)
         assert told.status == "suspect"
         assert told.warnings[0].startswith("the rig does not agree with the tracks: ")
         assert "of cameras[3] (d.mp4) would explain it best" in told.warnings[0]
