@@ -9,9 +9,8 @@ import json
 import re
 import subprocess
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
-
-import jupyter_server_mathjax
 
 ROOT = Path(__file__).parent.parent
 CONTENTS = """
@@ -76,6 +75,7 @@ include_patterns = [
     "*.md", "docs/*.md", "notebooks/*.ipynb", "notebooks/exercises/*.ipynb",
     "notebooks/solutions/*.ipynb", "figures/README.md", "build/api/vidsindy_lite*",
 ]  # fmt: skip
+exclude_patterns = [".*", "build/[!a]*"]  # folders of very many files
 nb_execution_mode = "off"
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
@@ -89,7 +89,8 @@ suppress_warnings = ["ref.python"]  # one name, several places
 html_theme = "furo"
 html_copy_source = False
 html_static_path = [
-    str(Path(jupyter_server_mathjax.__file__).parent / "static"), str(ROOT / "docs" / "site.css"),
+    str(Path(find_spec("jupyter_server_mathjax").origin).parent / "static"),
+    str(ROOT / "docs" / "site.css"),
 ]  # fmt: skip
 html_css_files = ["site.css"]
 html_use_index = False  # its names are wider than a screen

@@ -67,7 +67,7 @@ from vidsindy_lite.study import SAMPLES_PER_PERIOD, SYSTEMS, film, plots
 
 # %%
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
-frames, long = {"full": (300, 1500), "quick": (120, 400)}[profile]
+frames, long = {"full": (300, 1500), "quick": (96, 400)}[profile]
 folder = TemporaryDirectory()
 
 # %% [markdown]
@@ -117,7 +117,8 @@ def growth(system):
     return np.linalg.norm(other - one, axis=1).max() / spread
 
 
-largest = {name: growth(system) for name, system in SYSTEMS.items()}
+some = SYSTEMS if profile == "full" else ("Lorenz", "NoseHoover", "Tsucs2")
+largest = {name: growth(SYSTEMS[name]) for name in some}
 print(*(f"{name:15s}{value:.0e}" for name, value in largest.items()), sep="\n")
 regular = {name for name, value in largest.items() if value < 1e-3}
 apart = {name for name, difference in differences.items() if difference.max() > 0.1}

@@ -23,9 +23,13 @@ settings.load_profile("repeatable")
 
 
 def pytest_collection_modifyitems(items):
-    """Begin with notebooks and the files of long tests, so that no worker ends with one alone."""
+    """Begin with what takes longest, so that no worker ends with one alone: last, short files."""
     slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
-    items.sort(key=lambda item: (not item.get_closest_marker("notebooks"), -slow[item.path]))
+    items.sort(
+        key=lambda item: (
+            not item.get_closest_marker("notebooks"), -slow[item.path], -item.path.stat().st_size
+        )
+    )  # fmt: skip
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -1,9 +1,4 @@
-"""Films as phones write them, with the exact track of the target: for the tests of the tracker.
-
-A ball moves through a room (perspective, so that its size changes), blurred by its own motion and
-that of the camera, before light that flickers, beside its shadow or leaves, with
-sensor noise, and is written by H.264 at a low bit rate.
-"""
+"""Films of a ball as phones write them, with its exact track: for the tests of the tracker."""
 
 from dataclasses import dataclass
 from fractions import Fraction

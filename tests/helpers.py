@@ -99,11 +99,7 @@ def dependent(rng, n, memory):
 
 
 def scene(seed, n=500, cameras=3, kinds=(vl.OrthographicCamera,)):
-    """A random path, cameras of some kinds around it, their exact tracks, and the generator.
-
-    They look roughly at it, so differently that no axis is poorly seen, from 1.5 to 6 times its
-    reach.
-    """
+    """A random path, cameras of some kinds that look roughly at it, exact tracks, the generator."""
     rng = np.random.default_rng(seed)
     x = trajectory(rng, n)
     reach = np.linalg.norm(np.ptp(x, axis=0)) / 2

@@ -1,8 +1,4 @@
-"""Odd calls of public names and odd files for every reader: an answer, or one clear line.
-
-What may be raised is what the docstrings name; anything else is the traceback of an internal. The
-quick part stands with the tests, `pytest -m thorough` makes thousands of calls.
-"""
+"""Odd calls of public names and odd files for every reader: an answer, or one clear line."""
 
 import datetime
 import inspect

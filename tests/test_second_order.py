@@ -25,18 +25,11 @@ def filmed():
     return [c.project(x) + 0.1 * rng.normal(size=(240, 2)) for c in rig.cameras], rig
 
 
-@pytest.fixture(scope="module")
-def found(filmed):
-    return vl.discover_from_tracks(*filmed, fps=30, degree=2, order=2)
-
-
-def test_the_stiffness_of_three_springs(found):
+def test_the_stiffness_of_three_springs_and_a_report_on_accelerations(filmed, tmp_path):
+    found = vl.discover_from_tracks(*filmed, fps=30, degree=2, order=2)
     law = found.discovery.system
     assert law.text(2) == "x'' = -30 x - 0.25 vx\ny'' = -34 y - 0.25 vy\nz'' = -40 z - 0.25 vz"
     assert found.status == "ok", found.warnings
-
-
-def test_a_report_on_accelerations(found, tmp_path):
     write_report(found, None, tmp_path / "report", {})
     written = json.loads((tmp_path / "report" / "result.json").read_text())
     equations = [term["equation"] for term in written["law"]["data"]["terms"]]
@@ -51,16 +44,3 @@ def test_orders_that_are_none(filmed, capsys):
         vl.discover_from_videos(["a.mkv"], filmed[1], order=3)
     assert main(["discover", "--rig", "rig.toml", "--tracks", "a.csv", "--order", "3"]) == 2
     assert capsys.readouterr().err == "error: order: must be one of 1, 2, auto, got '3'\n"
-
-
-def test_the_command_passes_the_order_on(filmed, tmp_path, monkeypatch):
-    orders = []
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(
-        "vidsindy_lite.pipeline.discover_from_tracks", lambda *_, order, **__: orders.append(order)
-    )
-    filmed[1].save("rig.toml")
-    for given in ("1", "2", "auto"):
-        with pytest.raises(AttributeError):  # it was none
-            main(["discover", "--rig", "rig.toml", "--tracks", "a.csv", "--order", given])
-    assert orders == [1, 2, "auto"]

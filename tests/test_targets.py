@@ -76,15 +76,18 @@ def test_the_report_shows_both(films, found, tmp_path):
     assert write_refusal(refused, films[0], films[1], tmp_path / "refused").is_file()
 
 
-def test_the_command_passes_the_targets_on(films, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(("order", "given"), [("1", 1), ("2", 2), ("auto", "auto")])
+def test_the_command_passes_targets_and_order_on(
+    films, tmp_path, monkeypatch, capsys, order, given
+):
     def called(*_, **options):
-        raise ValueError(f"called with targets {options['targets']!r}")
+        raise ValueError(f"called with {options['targets']!r} and {options['order']!r}")
 
     monkeypatch.setattr("vidsindy_lite.pipeline.discover_from_videos", called)
     films[1].save(tmp_path / "rig.toml")
     options = ["--rig", str(tmp_path / "rig.toml"), "--out", str(tmp_path / "report")]
-    main(["discover", *map(str, films[0]), *options, "--targets", "2"])
-    assert "called with targets 2" in capsys.readouterr().err
+    main(["discover", *map(str, films[0]), *options, "--targets", "2", "--order", order])
+    assert f"called with 2 and {given!r}" in capsys.readouterr().err
     assert main(["discover", "--tracks", "a.csv", *options, "--targets", "2"]) == 2
     assert "targets: must be 1 with --tracks" in capsys.readouterr().err
 

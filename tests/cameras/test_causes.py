@@ -13,7 +13,7 @@ from vidsindy_lite import study
 from vidsindy_lite.cameras import explain, find_mistake, learn_cameras
 
 NAMES = ["a.mp4", "b.mp4", "c.mp4", "d.mp4"]
-FRAMES = np.arange(500)
+FRAMES = np.arange(300)
 
 
 def flawed(rng, what):
@@ -50,6 +50,11 @@ def test_the_cause_is_named(what):
     assert found.what == what
     assert re.match(CAUSES[what], found.text(NAMES))
     assert found.left < 1.5  # what half a pixel of noise leaves
+    if what == "normal":
+        told = vl.observe_tracks(tracks, rig, FRAMES / 30, lags="synchronous", names=NAMES)
+        assert told.status == "suspect"
+        assert told.warnings[0].startswith("the rig does not agree with the tracks: ")
+        assert "of cameras[3] (d.mp4) would explain it best" in told.warnings[0]
 
 
 @pytest.mark.parametrize("part", [{"distortion": (-0.15,)}, {"readout": 0.4}])

@@ -1,9 +1,4 @@
-"""A backend of matplotlib for tests of notebooks: figures are laid out and drawn, but on no paper.
-
-    MPLBACKEND=module://undisplayed PYTHONPATH=tests/disturbed
-
-Colouring, packing and showing pictures takes as long as all that small notebooks compute.
-"""
+"""A backend of matplotlib for tests of notebooks: figures are laid out, but on no paper."""
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image

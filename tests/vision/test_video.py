@@ -188,14 +188,9 @@ def read_by_opencv(path):
 
 
 ALL = [
-    ("a.mov", None),
-    ("a.mkv", None),
-    ("a.avi", "FFV1"),
-    ("a.mp4", "mp4v"),
-    ("a.avi", "MJPG"),
-    ("a.mkv", "MJPG"),
-    ("a.mp4", "H264"),
-]
+    ("a.mov", None), ("a.mkv", None), ("a.avi", "FFV1"), ("a.mp4", "mp4v"), ("a.avi", "MJPG"),
+    ("a.mkv", "MJPG"), ("a.mp4", "H264"),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("name", "codec"), ALL)
