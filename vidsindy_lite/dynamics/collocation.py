@@ -16,10 +16,10 @@ from functools import cached_property
 
 import numpy as np
 from scipy import sparse
-from scipy.linalg import LinAlgError, cholesky_banded
+from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
 from ..arrays import Bools, Floats, Ints
-from .bspline import WIDTH, Grid, Segment, normal_band, solve_factored
+from .bspline import WIDTH, Grid, Segment, normal_band
 from .l0 import RIDGE, equilibrated
 from .library import Function, along_state, law_variables, monomials, shift_generators
 
@@ -33,8 +33,6 @@ FAITHFUL = 1e-2
 ``p``, third order in the step, the next step would promise some ``9 m^2 / p``. Where the law holds
 so firmly that a step leaves nothing of its residual but what is second order, that is the miss, and
 the next step would promise all of it: so the miss has to be below the tolerance, too."""
-AT_ONCE = 10_000
-"""Rows that are multiplied at once where their product would be as large as what it is added to."""
 ROUNDING = 1e-14
 """What rounding does to a banded factor, relative to its largest entry: less could leave it without
 a root, more would hold the curve back."""
@@ -392,14 +390,12 @@ class Collocation:
         response = physics.T @ unknowns
         response[:, 0] += (self.grid.back @ (data_residual * self.sample_weights)).ravel()
         response[:, 1 + len(columns) :] = self._pull
-        response *= -1
-        solve_factored(factor, response)
+        response = -cho_solve_banded((factor, True), response, check_finite=False)
 
         objective = (data_residual**2 * self.sample_weights).sum()
         objective += (unknowns[:, 0] ** 2).sum()
         objective += sizes @ sizes
-        for k in range(0, len(unknowns), AT_ONCE):
-            unknowns[k : k + AT_ONCE] += physics[k : k + AT_ONCE] @ response
+        unknowns += physics @ response
         whole = self._gram(unknowns, response, data_residual)
         gram, shared = _without_systematic(whole, sizes)
         return WithCurve(

@@ -23,7 +23,7 @@ from .data import Trajectory, autocovariances, typical_step
 from .frames import closed, free_offsets, freed, laws_at
 from .l0 import LEAST, far_neighbours, newcomers, prior_penalties
 from .library import monomial_exponents, monomials, shift_matrix, velocity_names
-from .mechanics import Complexes, Round, on_circle, on_sphere
+from .mechanics import FAINT, Complexes, Round, on_circle, on_sphere
 from .model import PolynomialSystem, place, spoken, sum_text
 from .noise import CONSISTENT, GROSS, passing, residual_noise
 from .problem import COARSE, FINAL_WEIGHT, Problem
@@ -487,9 +487,6 @@ def _higher(exponents: Ints, d: int, most: float) -> Ints:
 # An axis whose origin is that of the data is a claim: of all places in the box of the data it
 # would be just there. It is believed if the data hold it to be so likelier than chance makes it.
 
-VANISHED = 1e-6
-"""What is left of a term in another frame, over the parts that cancel in it, if it vanishes."""
-
 Rival = tuple[str, str, float]
 """Which other origin, along which axis, and by how much the criterion rises there."""
 
@@ -522,7 +519,7 @@ def elsewhere(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[Riv
                 break  # the next costs more
             matrix = shift_matrix(problem.exponents, one.state.offset - given)
             parts = np.abs(matrix) @ np.abs(rival)
-            terms = (np.abs(matrix @ rival) > VANISHED * parts) | (problem.known != 0)
+            terms = (np.abs(matrix @ rival) > FAINT * parts) | (problem.known != 0)
             if (terms != law.support).any():
                 axis = int(np.argmax(moving != state.moving))
                 where = "another origin" if moving[axis] else "the origin of the data"
@@ -546,7 +543,7 @@ def pinned(
         Errors that have to be tolerated, over those that the law leaves.
     """
     for axis, gain, room, moved in freed(problem, state, model, tolerated):
-        new = (np.abs(moved) > VANISHED * np.abs(moved).max(initial=0.0)) & ~law.support
+        new = (np.abs(moved) > FAINT * np.abs(moved).max(initial=0.0)) & ~law.support
         # Odds of 20 to 1: strong evidence by Kass and Raftery 1995.
         if state.moving.any() and new.any() and room - gain < 6.0:
             yield "another origin", problem.form.names[axis], room - gain

@@ -36,10 +36,6 @@ from .path import ROUNDS, first_law, information_criterion, near, persistent
 from .problem import Problem, pose
 from .result import LIBRARY, NAME, Discovery, History, Path, Swing, swinging
 
-MOST_LAWS = 3
-"""Most laws to which paths are followed: a first, one under process noise, one at larger errors."""
-
-
 _lock = Lock()
 _at_work: list[threadpool_limits] = []  # one for each discovery, the first of which counts
 
@@ -254,7 +250,8 @@ def _solved(task: _Task, form: Form) -> Solved:
     trajectories, shared, sigma = task.measured
     probes = np.random.default_rng(task.seed)
     problems = views(lambda *how: pose(trajectories, shared, form, probes, sigma, *how))
-    rounds = MOST_LAWS * (1 + ROUNDS) * len(problems)
+    # A first law, one under process noise, and one at larger errors.
+    rounds = 3 * (1 + ROUNDS) * len(problems)
     with bar(task.progress, "discover", total=rounds, leave=False) as shown_bar:
         history = History(end=task.end, bar=shown_bar)
         laws = [_law(problem, probes, history, not task.turned) for problem in problems]
