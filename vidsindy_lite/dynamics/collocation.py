@@ -25,14 +25,6 @@ from .library import Function, along_state, law_variables, monomials, shift_gene
 
 CLEANEST = 1e-5
 """Least noise, relative to the spread of the data, that the splines are trusted to resolve."""
-NEARLY = 1e-2
-"""Fall of the objective promised by the next step, below which a fit that ran out of steps has
-converged all the same: a tenth of a standard error, squared."""
-FAITHFUL = 1e-2
-"""A step whose fall missed what it promised by so little was the last: of a miss ``m`` of a promise
-``p``, third order in the step, the next step would promise some ``9 m^2 / p``. Where the law holds
-so firmly that a step leaves nothing of its residual but what is second order, that is the miss, and
-the next step would promise all of it: so the miss has to be below the tolerance, too."""
 ROUNDING = 1e-14
 """What rounding does to a banded factor, relative to its largest entry: less could leave it without
 a root, more would hold the curve back."""
@@ -488,7 +480,7 @@ class Collocation:
             After so many steps it ends anyway.
         """
         columns = np.flatnonzero(state.free())
-        value, promise, damping = self.objective(state), np.inf, 0.0
+        value, damping = self.objective(state), 0.0
         for _ in range(max_steps):
             try:
                 model = self.linearise(state, columns, damping)
@@ -509,15 +501,9 @@ class Collocation:
                 if damping > 1e2:
                     return Fit(state, self, Status.STALLED)
                 continue
-            miss = abs(value - trial_value - promise)
             state, value = trial, trial_value
-            limit = FAITHFUL * tolerance * promise
-            faithful = miss < 10 * tolerance and miss * miss < limit  # a power may overflow
-            if fraction == 1.0 and damping == 0.0 and faithful:
-                return Fit(state, self, Status.CONVERGED)
             damping = damping / 10 if damping > 1e-8 else 0.0
-        near = damping == 0.0 and promise < NEARLY
-        return Fit(state, self, Status.CONVERGED if near else Status.MAX_STEPS)
+        return Fit(state, self, Status.MAX_STEPS)
 
 
 def _without_systematic(gram: Floats, sizes: Floats, share: float = 1.0) -> tuple[Floats, Floats]:

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from .collocation import Fit, Linearisation, State
-from .l0 import closest_rival, minimiser, newcomers, subset_search
+from .collocation import Fit, State
+from .l0 import closest_rival, minimiser, subset_search
 from .library import divides, shift_generators, shift_matrix
 from .problem import Problem
 
@@ -159,56 +159,3 @@ def laws_at(
         yield told(minimiser(*quadratic, support), value + cost)
 
     return (at(*origin) for origin in origins)
-
-
-def with_free_axis(
-    problem: Problem, state: State, model: Linearisation, tolerated: float
-) -> State | None:
-    """The state with the free axis by which its law gains most, if one is worth its penalty.
-
-    Its terms were chosen at larger errors, which may not have told it from where the data have it.
-    What it gains has to be worth the penalty, and more than its place would be a coincidence.
-
-    Parameters
-    ----------
-    problem : Problem
-        Its penalties.
-    state : State
-        Of the last fit.
-    model : Linearisation
-        Around it, of all candidates and moving axes.
-    tolerated : float
-        Errors that have to be tolerated, over those that the law leaves.
-    """
-    axes = freed(problem, state, model, tolerated)
-    gains = [(gain - max(room, problem.axis_penalty), axis) for axis, gain, room, _ in axes]
-    gain, axis = max(gains, default=(0.0, 0))
-    if not gain > 0:
-        return None
-    return replace(state, moving=state.moving | (np.arange(problem.d) == axis))
-
-
-def freed(
-    problem: Problem, state: State, model: Linearisation, tolerated: float
-) -> Iterator[tuple[int, float, float, Floats]]:
-    """Axes that are not free, what the law would gain if one were, and what a place is worth.
-
-    That is twice the logarithm of how much wider the box of the data is than the origin is
-    uncertain. And what the move does to the law in the frame of the data, (l, d). Without those
-    whose move the terms of the law make up for.
-    """
-    low, high = problem.box
-    own = np.flatnonzero(state.free()[model.columns])
-    generators = shift_generators(problem.exponents)
-    forth = shift_matrix(problem.exponents, state.offset - problem.origin)
-    for axis in np.flatnonzero(problem.form.movable & ~state.moving).tolist():
-        rate = -generators[axis] @ state.coefficients
-        rows = np.eye(len(model.columns))[own]
-        rows = np.vstack([rows, np.append(rate.T.ravel(), np.zeros(problem.d))[model.columns]])
-        (place,), (variance,) = newcomers(
-            rows @ model.information @ rows.T, rows @ model.gradient, len(own)
-        )
-        if np.isfinite(variance):
-            variance *= tolerated**2
-            room = np.log((high - low)[axis] ** 2 / (2 * np.pi * variance))
-            yield axis, float(place**2 / variance), float(room), forth @ rate

@@ -23,7 +23,7 @@ from scipy.stats import special_ortho_group
 
 from ..arrays import Floats, Ints
 from ..checks import check_choice
-from .collocation import Fit, Linearisation, State
+from .collocation import Fit, Linearisation, State, Status
 from .data import Trajectory, variable_names
 from .l0 import inverse
 from .library import Library, monomials
@@ -107,8 +107,8 @@ def rough_orientations(problem: Problem, rng: np.random.Generator, most: int = 3
     degrees, m = problem.exponents.sum(axis=1), _places(problem)
     found: list[Floats] = []
     for degree in range(1, problem.form.degree + 1):
-        fit, converged = unpruned(problem, degrees <= degree)
-        if not converged:  # too many terms for these data
+        fit = unpruned(problem, degrees <= degree)
+        if fit.status is not Status.CONVERGED:  # too many terms for these data
             continue
         law = TurnedLaw.of(problem, fit)
         law = replace(law, estimates=law.estimates[:41])
