@@ -171,7 +171,7 @@ def test_the_progress_bar_knows_its_end(monkeypatch, persists):
     monkeypatch.setattr(solver, "persistent", lambda *a: (*followed(*a)[:2], persists))
     t = np.linspace(0, 12, 200)
     discover(t, np.stack([np.sin(t), np.cos(t)], axis=1), degree=1, progress=True)
-    end = solver.MOST_LAWS * (1 + solver.ROUNDS)
+    end = 3 * (1 + solver.ROUNDS)
     assert bars[0] == (end, end)
 
 

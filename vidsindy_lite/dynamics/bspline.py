@@ -15,7 +15,6 @@ import numpy as np
 from scipy import sparse
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
-from scipy.linalg.blas import dtrsm
 
 from ..arrays import Floats, Ints
 
@@ -294,7 +293,7 @@ def rows_from(first: Ints, values: Floats, size: int) -> sparse.csr_array:
 
 
 # --------------------------------------------------------------------------------------------------
-# Normal matrices of splines, in lower banded storage, and what goes with them.
+# Normal matrices of splines, in lower banded storage.
 #
 # A point of a curve touches few control points, so its normal matrix is a narrow band, and so is
 # the Cholesky factor of that.
@@ -316,45 +315,6 @@ def normal_band(rows: sparse.csr_array, weights: Floats | None = None, alike: in
         below = products.diagonal(-lag, axis1=1, axis2=2)
         band[lag] = np.bincount(first[:, : width - lag].ravel(), below.ravel(), minlength=size)
     return band
-
-
-def solve_factored(factor: Floats, right: Floats, block: int = 48) -> None:
-    """Solve ``L L' x = right`` for many right-hand sides, (n, m), in their place.
-
-    ``L`` is in lower banded storage. LAPACK takes one right-hand side after the other; block by
-    block, of so many rows at least, all of them at once are three times as fast.
-    """
-    reach, n = len(factor) - 1, len(right)
-    size = max(block, 2 * reach)
-    blocks = [right[start : start + size] for start in range(0, n, size)]
-    rows = _unrolled(factor, size)
-    triangles = [row[: len(here), : len(here)].T for row, here in zip(rows, blocks, strict=True)]
-    onward, last = rows[:, size + 1 - reach :, :reach], len(blocks) - 1
-    for k, here in enumerate(blocks):
-        dtrsm(1.0, triangles[k], here.T, 1, 1, 1, overwrite_b=1)
-        if k < last:
-            after = blocks[k + 1][:reach]
-            after -= onward[k, :, : len(after)].T @ here[-reach:]
-    for k in range(last, -1, -1):
-        here = blocks[k]
-        if k < last:
-            after = blocks[k + 1][:reach]
-            here[-reach:] -= onward[k, :, : len(after)] @ after
-        dtrsm(1.0, triangles[k], here.T, 1, 1, overwrite_b=1)
-
-
-def _unrolled(factor: Floats, size: int) -> Floats:
-    """Columns of a banded matrix in blocks of a size, each as rows, (blocks, size + 1, size).
-
-    Rows of one more than a block, read as rows of a block: so each column begins one place further
-    on than the last. What reaches on to the next block then lies before the diagonal.
-    """
-    width, n = factor.shape
-    count = -(-n // size)
-    columns = np.zeros((count, size, size + 1))
-    padded = np.pad(factor, ((0, 0), (0, count * size - n)))
-    columns[:, :, :width] = padded.reshape(width, count, size).transpose(1, 2, 0)
-    return columns.reshape(count, size + 1, size)
 
 
 # --------------------------------------------------------------------------------------------------
@@ -429,27 +389,21 @@ def _cross_validated(
     probes[np.arange(n), np.arange(n) % PROBES] = signs
     right = samples.T @ np.concatenate([x, probes], axis=1)
     best, noise = np.full(d, np.inf), np.zeros(d)
-    control, chosen = np.zeros((samples.shape[1], d)), np.zeros(d, dtype=int)
-    every = np.arange(len(penalties))
-    pitch = 4  # one penalty in so many is tried first, then those beside the best
-    coarse = every % pitch == 0
-    for refined in (False, True):
-        near = np.abs(every[:, None] - chosen).min(axis=1) < pitch
-        for index in every[near & ~coarse if refined else coarse]:
-            band = sample_band + penalties[index] * roughness
-            band[0] += 1e-12 * band[0].max()
-            solved = cho_solve_banded((cholesky_banded(band, lower=True), True), right)
-            fitted = samples @ solved
-            trace = (probes * fitted[:, d:]).sum()
-            free = max(n - trace, 1e-9 * n)
-            squares = ((x - fitted[:, :d]) ** 2).sum(axis=0)
-            score = n * squares / free**2
-            better = score < best
-            best[better], chosen[better] = score[better], index
-            control[:, better] = solved[:, :d][:, better]
-            # E |K e|^2 = variance tr(K K'), K = I - influence: holds where hardly anything is
-            # smoothed.
-            noise[better] = np.sqrt(squares[better] / ((probes - fitted[:, d:]) ** 2).sum())
+    control = np.zeros((samples.shape[1], d))
+    for penalty in penalties:
+        band = sample_band + penalty * roughness
+        band[0] += 1e-12 * band[0].max()
+        solved = cho_solve_banded((cholesky_banded(band, lower=True), True), right)
+        fitted = samples @ solved
+        trace = (probes * fitted[:, d:]).sum()
+        free = max(n - trace, 1e-9 * n)
+        squares = ((x - fitted[:, :d]) ** 2).sum(axis=0)
+        score = n * squares / free**2
+        better = score < best
+        best[better] = score[better]
+        control[:, better] = solved[:, :d][:, better]
+        # E |K e|^2 = variance tr(K K'), K = I - influence: holds where hardly anything is smoothed.
+        noise[better] = np.sqrt(squares[better] / ((probes - fitted[:, d:]) ** 2).sum())
     return control, noise
 
 

@@ -20,10 +20,16 @@ from scipy.special import betaincc, chdtrc, chdtri
 from ..arrays import Bools, Floats, Ints
 from .collocation import CLEANEST, Fit, Linearisation, State, Status
 from .data import Trajectory, autocovariances, typical_step
-from .frames import closed, free_offsets, freed, laws_at
+from .frames import closed, free_offsets, laws_at
 from .l0 import LEAST, far_neighbours, newcomers, prior_penalties
-from .library import monomial_exponents, monomials, shift_matrix, velocity_names
-from .mechanics import Complexes, Round, on_circle, on_sphere
+from .library import (
+    monomial_exponents,
+    monomials,
+    shift_generators,
+    shift_matrix,
+    velocity_names,
+)
+from .mechanics import FAINT, Complexes, Round, on_circle, on_sphere
 from .model import PolynomialSystem, place, spoken, sum_text
 from .noise import CONSISTENT, GROSS, passing, residual_noise
 from .problem import COARSE, FINAL_WEIGHT, Problem
@@ -487,9 +493,6 @@ def _higher(exponents: Ints, d: int, most: float) -> Ints:
 # An axis whose origin is that of the data is a claim: of all places in the box of the data it
 # would be just there. It is believed if the data hold it to be so likelier than chance makes it.
 
-VANISHED = 1e-6
-"""What is left of a term in another frame, over the parts that cancel in it, if it vanishes."""
-
 Rival = tuple[str, str, float]
 """Which other origin, along which axis, and by how much the criterion rises there."""
 
@@ -522,7 +525,7 @@ def elsewhere(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[Riv
                 break  # the next costs more
             matrix = shift_matrix(problem.exponents, one.state.offset - given)
             parts = np.abs(matrix) @ np.abs(rival)
-            terms = (np.abs(matrix @ rival) > VANISHED * parts) | (problem.known != 0)
+            terms = (np.abs(matrix @ rival) > FAINT * parts) | (problem.known != 0)
             if (terms != law.support).any():
                 axis = int(np.argmax(moving != state.moving))
                 where = "another origin" if moving[axis] else "the origin of the data"
@@ -536,7 +539,7 @@ def pinned(
     """Axes that may as well be free, a little off the data's, by which the law had other terms.
 
     Where other axes are free, none is fixed for the asking: to be there is a coincidence, as much
-    as the box is wider than the origin is uncertain. A move costs twice its logarithm.
+    as the box of the data is wider than the origin is uncertain. A move costs twice its logarithm.
 
     Parameters
     ----------
@@ -545,11 +548,26 @@ def pinned(
     tolerated : float
         Errors that have to be tolerated, over those that the law leaves.
     """
-    for axis, gain, room, moved in freed(problem, state, model, tolerated):
-        new = (np.abs(moved) > VANISHED * np.abs(moved).max(initial=0.0)) & ~law.support
+    if not state.moving.any():
+        return
+    (low, high), generators = problem.box, shift_generators(problem.exponents)
+    own = np.eye(len(model.columns))[np.flatnonzero(state.free()[model.columns])]
+    forth = shift_matrix(problem.exponents, state.offset - problem.origin)
+    for axis in np.flatnonzero(problem.form.movable & ~state.moving).tolist():
+        rate = -generators[axis] @ state.coefficients
+        rows = np.vstack([own, np.append(rate.T.ravel(), np.zeros(problem.d))[model.columns]])
+        (place,), (variance,) = newcomers(
+            rows @ model.information @ rows.T, rows @ model.gradient, len(own)
+        )
+        if not np.isfinite(variance):  # the terms of the law make up for such a move
+            continue
+        variance *= tolerated**2
+        cost = float(np.log((high - low)[axis] ** 2 / (2 * np.pi * variance)) - place**2 / variance)
+        moved = forth @ rate
+        new = (np.abs(moved) > FAINT * np.abs(moved).max(initial=0.0)) & ~law.support
         # Odds of 20 to 1: strong evidence by Kass and Raftery 1995.
-        if state.moving.any() and new.any() and room - gain < 6.0:
-            yield "another origin", problem.form.names[axis], room - gain
+        if new.any() and cost < 6.0:
+            yield "another origin", problem.form.names[axis], cost
 
 
 def untold_origins(found: Sequence[Rival], remedy: str) -> Iterator[str]:

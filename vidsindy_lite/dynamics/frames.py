@@ -11,13 +11,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from .collocation import Fit, Linearisation, State
-from .l0 import closest_rival, minimiser, newcomers, subset_search
+from .collocation import Fit, State
+from .l0 import closest_rival, minimiser, subset_search
 from .library import divides, shift_generators, shift_matrix
 from .problem import Problem
 
@@ -37,8 +36,6 @@ class ShiftedLaw:
         Estimate in the present frame.
     information : ndarray, shape (l d, l d)
         Its information matrix, equation by equation.
-    movable : ndarray of bool, shape (d,), optional
-        Along which axes its origin is sought; all by default.
     gradient : ndarray, shape (l d,), optional
         What still pulls at the coefficients (see `subset_search`); nothing by default.
     """
@@ -46,64 +43,31 @@ class ShiftedLaw:
     exponents: Ints
     coefficients: Floats
     information: Floats
-    movable: Bools | None = None
     gradient: Floats | None = None
-
-    @property
-    def d(self) -> int:
-        """Dimension of the state."""
-        return self.coefficients.shape[1]
-
-    @cached_property
-    def axes(self) -> Ints:
-        """The movable axes."""
-        return np.arange(self.d) if self.movable is None else np.flatnonzero(self.movable)
-
-    @cached_property
-    def generators(self) -> Floats:
-        """What a move along each axis does to the law; see `shift_generators`."""
-        return shift_generators(self.exponents)
-
-    @cached_property
-    def _with_rates(self) -> Floats:
-        """The coefficients and their rates along the movable axes, which shifts carry alike."""
-        return np.stack([self.coefficients, *(self.generators[self.axes] @ self.coefficients)])
 
     def at(self, origin: Floats) -> tuple[Floats, Floats, Floats]:
         """Coefficients (l, d), information and gradient in monomials of ``x - origin``."""
         forth = shift_matrix(self.exponents, -origin)
-        back = np.kron(np.eye(self.d), shift_matrix(self.exponents, origin))
+        back = np.kron(np.eye(len(origin)), shift_matrix(self.exponents, origin))
         pull = np.zeros(len(back)) if self.gradient is None else back.T @ self.gradient
         return forth @ self.coefficients, back.T @ self.information @ back, pull
 
-    def vanish(self, origins: Floats, entries: Ints) -> Floats:
-        """Move each origin as little as possible so that the given coefficients vanish.
 
-        Parameters
-        ----------
-        origins : ndarray, shape (n, d)
-            Where to start.
-        entries : ndarray of int, shape (n, k, 2)
-            Equation and term of each coefficient.
+@np.errstate(all="ignore")  # of moves that lead nowhere
+def _vanishing(exponents: Ints, law: Floats, entries: Ints, axes: Ints) -> Floats:
+    """The shortest moves of the origin after which single coefficients of a law vanish, (n, d).
 
-        Returns
-        -------
-        ndarray, shape (n, d)
-            NaN where no origin was found.
-        """
-        equations, terms = np.moveaxis(entries, -1, 0)
-        here, origins = self._with_rates[:, :, equations], origins.copy()
-        moving = np.arange(len(origins))
-        for _ in range(6):
-            shift = shift_matrix(self.exponents, -origins[moving], terms[moving])
-            values = np.einsum("nkl,alnk->nka", shift, here[:, :, moving])
-            back = np.linalg.pinv(values[:, :, 1:], rcond=1e-6)
-            step = -(back @ values[:, :, :1])[:, :, 0]
-            origins[np.ix_(moving, self.axes)] += step
-            lost = ~(np.abs(origins[moving]) < 1e6).all(axis=1)
-            origins[moving[lost]] = np.nan
-            moving = moving[~lost & (np.abs(step) >= 1e-9).any(axis=1)]
-        return origins
+    Of each entry, (n, 2), its equation and term; along some axes, by Newton steps. Not finite, or
+    far away, where there is no such move.
+    """
+    equations, terms = entries.T
+    along = np.stack([law, *(shift_generators(exponents)[axes] @ law)])[:, :, equations]
+    moves = np.zeros((len(entries), law.shape[1]))
+    for _ in range(6):
+        shift = shift_matrix(exponents, -moves, terms[:, None])[:, 0]
+        values, rates = np.split(np.einsum("nl,aln->na", shift, along), [1], axis=1)
+        moves[:, axes] -= values * rates / (rates**2).sum(axis=1, keepdims=True)
+    return moves
 
 
 def free_offsets(problem: Problem, state: State, movable: Bools) -> list[Origin]:
@@ -112,12 +76,11 @@ def free_offsets(problem: Problem, state: State, movable: Bools) -> list[Origin]
     Terms that a move brings in are the data's to decide on, while the origin moves.
     """
     exponents, fixed = problem.exponents, movable & ~state.moving
-    frames = ShiftedLaw(exponents, state.coefficients, np.empty(0), fixed)
     below = divides(exponents, fixed) & ~np.eye(len(exponents), dtype=bool)
     low, high = problem.box
     found: list[Origin] = []
     entries = np.argwhere((state.active & (below @ state.active)).T)
-    for step in frames.vanish(np.zeros((len(entries), problem.d)), entries[:, None]):
+    for step in _vanishing(exponents, state.coefficients, entries, np.flatnonzero(fixed)):
         origin, moved = state.offset + step, np.abs(step) > 1e-9  # more than rounding
         known = any(np.allclose(origin, other) for other, _ in found)
         inside = ((low <= origin) & (origin <= high))[moved].all()  # not if it is infinite
@@ -166,11 +129,12 @@ def laws_at(
     information[np.ix_(columns, columns)], gradient[columns] = model.information, model.gradient
     law = ShiftedLaw(problem.exponents, state.coefficients, information, gradient=gradient)
     objective, size = whole.collocation.objective(state), len(columns)
+    generators = shift_generators(problem.exponents)
 
     def at(origin: Floats, moving: Bools) -> Iterator[Fit]:
         coefficients, information, gradient = law.at(origin)
         axes = np.flatnonzero(moving & free)
-        rates = -law.generators[axes] @ coefficients
+        rates = -generators[axes] @ coefficients
         flat_rates = rates.swapaxes(1, 2).reshape(-1, coefficients.size)
         ways = np.vstack([np.eye(size), flat_rates[:, columns]])
         present = np.append(coefficients.T.ravel()[columns], np.zeros(len(axes)))
@@ -195,56 +159,3 @@ def laws_at(
         yield told(minimiser(*quadratic, support), value + cost)
 
     return (at(*origin) for origin in origins)
-
-
-def with_free_axis(
-    problem: Problem, state: State, model: Linearisation, tolerated: float
-) -> State | None:
-    """The state with the free axis by which its law gains most, if one is worth its penalty.
-
-    Its terms were chosen at larger errors, which may not have told it from where the data have it.
-    What it gains has to be worth the penalty, and more than its place would be a coincidence.
-
-    Parameters
-    ----------
-    problem : Problem
-        Its penalties.
-    state : State
-        Of the last fit.
-    model : Linearisation
-        Around it, of all candidates and moving axes.
-    tolerated : float
-        Errors that have to be tolerated, over those that the law leaves.
-    """
-    axes = freed(problem, state, model, tolerated)
-    gains = [(gain - max(room, problem.axis_penalty), axis) for axis, gain, room, _ in axes]
-    gain, axis = max(gains, default=(0.0, 0))
-    if not gain > 0:
-        return None
-    return replace(state, moving=state.moving | (np.arange(problem.d) == axis))
-
-
-def freed(
-    problem: Problem, state: State, model: Linearisation, tolerated: float
-) -> Iterator[tuple[int, float, float, Floats]]:
-    """Axes that are not free, what the law would gain if one were, and what a place is worth.
-
-    That is twice the logarithm of how much wider the box of the data is than the origin is
-    uncertain. And what the move does to the law in the frame of the data, (l, d). Without those
-    whose move the terms of the law make up for.
-    """
-    low, high = problem.box
-    own = np.flatnonzero(state.free()[model.columns])
-    generators = shift_generators(problem.exponents)
-    forth = shift_matrix(problem.exponents, state.offset - problem.origin)
-    for axis in np.flatnonzero(problem.form.movable & ~state.moving).tolist():
-        rate = -generators[axis] @ state.coefficients
-        rows = np.eye(len(model.columns))[own]
-        rows = np.vstack([rows, np.append(rate.T.ravel(), np.zeros(problem.d))[model.columns]])
-        (place,), (variance,) = newcomers(
-            rows @ model.information @ rows.T, rows @ model.gradient, len(own)
-        )
-        if np.isfinite(variance):
-            variance *= tolerated**2
-            room = np.log((high - low)[axis] ** 2 / (2 * np.pi * variance))
-            yield axis, float(place**2 / variance), float(room), forth @ rate

@@ -23,8 +23,6 @@ COLLINEAR = 1e-9
 """Share of a column that is not a combination of others, below which it is taken to be one."""
 NEGLIGIBLE = 1e-6
 """Changes of the function below this are taken for rounding."""
-MOST_CHANGES = 4
-"""Most changes of a support on its way down, for each entry that there is."""
 FAR = 4.0
 """Standard errors of a coefficient beyond which another law has another coefficient."""
 LEAST = 1e-300
@@ -247,10 +245,7 @@ def _search(model: _Quadratic, start: Bools) -> _Fit:
     """The lowest value from a support and from nothing, and through newcomers from there."""
     starts = (start, np.isneginf(model.penalty))
     best = min((_descend(model, first) for first in starts), key=model.value)
-    for _ in range(MOST_CHANGES * len(start)):
-        deeper = _through_newcomer(model, best)
-        if deeper is None:
-            break
+    while (deeper := _through_newcomer(model, best)) is not None:
         best = deeper
     return best
 
@@ -258,16 +253,15 @@ def _search(model: _Quadratic, start: Bools) -> _Fit:
 def _descend(model: _Quadratic, start: Bools) -> _Fit:
     """Take the best of all drops, adds and swaps until none helps."""
     best = model.fit(start)
-    for _ in range(MOST_CHANGES * len(start)):
+    while True:
         change, dropped, added = _best_change(model, best)
         if not change < -NEGLIGIBLE:
             return best
-        # Rounding may promise a fall that does not come: what counts is the value itself.
         fit = model.fit(_changed(best.support, dropped, added))
+        # Rounding may promise a fall that does not come: what counts is the value itself.
         if not model.value(fit) < model.value(best) - NEGLIGIBLE:
             return best
         best = fit
-    return best
 
 
 def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:

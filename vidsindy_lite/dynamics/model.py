@@ -49,9 +49,8 @@ from .library import (
 # Sprott's F over 15 periods depends on whether the processor adds two products in one instruction.
 # So the integrators here use nothing whose rounding is left to a library of linear algebra.
 
-STAGES = DOP853.n_stages
-STAGE_WEIGHTS = [row[:stage, None] for stage, row in enumerate(DOP853.A[:STAGES])]
-WEIGHTS, THIRD, FIFTH = (row[:STAGES, None] for row in (DOP853.B, DOP853.E3, DOP853.E5))
+STAGES = [row[:k, None] for k, row in enumerate(DOP853.A[: DOP853.n_stages])]
+WEIGHTS, THIRD, FIFTH = (row[: len(STAGES), None] for row in (DOP853.B, DOP853.E3, DOP853.E5))
 """Coefficients of the step, and of its errors against steps of order 3 and 5."""
 
 
@@ -191,10 +190,9 @@ def _step(
     rate: Callable[[Floats], Floats], x: Floats, step: float, tolerance: float
 ) -> tuple[Floats, float]:
     """A step of order 8, and its error over the tolerance."""
-    slopes = np.empty((STAGES, len(x)))
-    slopes[0] = rate(x)
-    for stage in range(1, STAGES):
-        slopes[stage] = rate(x + step * np.add.reduce(STAGE_WEIGHTS[stage] * slopes[:stage]))
+    slopes = np.empty((len(STAGES), len(x)))
+    for k, weights in enumerate(STAGES):
+        slopes[k] = rate(x + step * np.add.reduce(weights * slopes[:k]))
     moved = x + step * np.add.reduce(WEIGHTS * slopes)
     scale = tolerance * (1 + np.maximum(np.abs(x), np.abs(moved)))
     third, fifth = (

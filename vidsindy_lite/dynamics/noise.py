@@ -16,7 +16,7 @@ from scipy.special import ndtr
 
 from ..arrays import Bools, Floats
 from .bspline import Segment
-from .collocation import CLEANEST, Collocation, Fit, State
+from .collocation import CLEANEST, Collocation, Fit, State, Status
 from .data import CHANCE, autocovariances, inflation
 from .l0 import LEAST, RIDGE
 from .problem import COARSE, FINAL_WEIGHT, Problem, fit_curves, spread_to_unseen, unpruned
@@ -206,8 +206,6 @@ def _factors(residual: Floats, causes: list[Floats]) -> Floats:
     plain = n * np.log((residual**2).mean()) + n + np.log(n)
     if not cost < plain - LIKELY or gross.mean() > 0.1:  # if so many are wrong, the law is
         return even
-    if inflation([np.where(gross, 0.0, residual / np.sqrt(variance))[:, None]])[0] > 1.5:
-        variance = even  # what lasts is no noise, but a single sample may still be wrong
     precision = np.minimum(np.median(variance) / variance, LARGEST_RATIO)
     return np.where(gross & _alone(residual), 0.0, precision)
 
@@ -460,9 +458,9 @@ def _by_terms(problem: Problem) -> Problem | None:
     """The problem with the noise that terms leave, as many as converge, if it is far less."""
     degrees = problem.exponents.sum(axis=1)
     for degree in range(problem.form.degree, 0, -1):
-        fit, converged = unpruned(problem, ~problem.form.implicit & (degrees <= degree))
+        fit = unpruned(problem, ~problem.form.implicit & (degrees <= degree))
         left = residual_noise(fit)
         over = CONSISTENT * left < problem.noise
-        if converged and over.any():
+        if fit.status is Status.CONVERGED and over.any():
             return replace(problem, noise=np.where(over, left, problem.noise))
     return None

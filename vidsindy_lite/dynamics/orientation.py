@@ -23,7 +23,7 @@ from scipy.stats import special_ortho_group
 
 from ..arrays import Floats, Ints
 from ..checks import check_choice
-from .collocation import Fit, Linearisation, State
+from .collocation import Fit, Linearisation, State, Status
 from .data import Trajectory, variable_names
 from .l0 import inverse
 from .library import Library, monomials
@@ -33,8 +33,6 @@ from .result import Discovery
 
 ALIKE = np.deg2rad(2.0)
 """Orientations that differ by less are one."""
-POINTS = 3
-"""Points at which two polynomials are compared, over the number of their terms."""
 
 Solved = tuple[Discovery, Problem, Fit]
 Measured = tuple[list[Trajectory], list[Floats], list[Floats] | None]
@@ -109,8 +107,8 @@ def rough_orientations(problem: Problem, rng: np.random.Generator, most: int = 3
     degrees, m = problem.exponents.sum(axis=1), _places(problem)
     found: list[Floats] = []
     for degree in range(1, problem.form.degree + 1):
-        fit, converged = unpruned(problem, degrees <= degree)
-        if not converged:  # too many terms for these data
+        fit = unpruned(problem, degrees <= degree)
+        if fit.status is not Status.CONVERGED:  # too many terms for these data
             continue
         law = TurnedLaw.of(problem, fit)
         law = replace(law, estimates=law.estimates[:41])
@@ -193,8 +191,8 @@ def _turns(problem: Problem, state: State, step: float = 1e-4) -> Floats:
 def _mapped(
     exponents: Ints, laws: Floats, inward: Floats, origin: Floats, outward: Floats
 ) -> Floats:
-    """The laws, (..., l, m), of ``outward f(inward y + origin)``, compared at points enough."""
-    y = np.random.default_rng(0).uniform(-1, 1, (POINTS * len(exponents), exponents.shape[1]))
+    """The laws, (..., l, m), of ``outward f(inward y + origin)``: alike at three points a term."""
+    y = np.random.default_rng(0).uniform(-1, 1, (3 * len(exponents), exponents.shape[1]))
     values = monomials(y @ inward.T + origin, exponents) @ laws @ outward.T
     return np.linalg.pinv(monomials(y, exponents)) @ values
 

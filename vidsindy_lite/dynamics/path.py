@@ -28,8 +28,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 from ..arrays import Bools, Floats
 from .bspline import Segment
 from .collocation import Fit, State, Status
-from .data import Trajectory
-from .frames import Origin, cheapest, closed, free_offsets, with_fewer_axes, with_free_axis
+from .frames import Origin, cheapest, closed, free_offsets, with_fewer_axes
 from .l0 import NEGLIGIBLE, inverse, minimiser, subset_path, subset_search
 from .model import PolynomialSystem, runge_kutta_4
 from .noise import (
@@ -59,9 +58,6 @@ LARGEST, STEP = 1.0, 0.1
 """Largest error on a path, that of no law at all; and decades between two laws of a path."""
 ROUNDS = 6
 """Most laws to which paths lead, each followed around the law before."""
-ENOUGH_SAMPLES, ENOUGH_TURNS, LARGEST_SHARE = 3000, 30, 0.5
-"""A first law is sought on so many samples and turns of the motion, if they are no more than that
-share of the data."""
 LONGEST_SEARCH = 10
 """Most rounds of a subset search, and most moves of an origin."""
 EXACT = 1e-4
@@ -122,51 +118,29 @@ def typical(noise: Floats) -> float:
 
 
 def first_law(problem: Problem, history: History, tolerated: float | None = None) -> Fit:
-    """The cheapest law at a large tolerated error, from terms of low degree, then from all.
+    """A law at a large tolerated error: of terms of low degree, and of all if these miss something.
 
-    Relative to the spread of the data, `TOLERATED` by default; where the noise is larger, that is
-    tolerated, and kicks are as they are. Long data are searched in part: all of them then decide on
-    the terms once more.
+    The error is relative to the spread of the data, `TOLERATED` by default; where the noise is
+    larger, that is tolerated, and kicks are as they are.
     """
     least = TOLERATED if tolerated is None else tolerated
     noise = problem.noise if problem.has_process_noise else np.maximum(problem.noise, least)
-    tolerant, stretches = replace(problem, noise=noise), enough(problem)
-    part, found = replace(tolerant, stretches=stretches), []
-    degrees, implicit = part.exponents.sum(axis=1), part.form.implicit
+    tolerant = replace(problem, noise=noise)
+    degrees, implicit = problem.exponents.sum(axis=1), problem.form.implicit
     # Terms of denominators come last: a factor above and below the line changes nothing.
     stages = [~implicit & (degrees <= 2), ~implicit, np.ones_like(implicit)]
     for k, rows in enumerate(stages):
         if k and (rows == stages[k - 1]).all():
             continue
-        whole, _ = unpruned(part, rows)
-        history.add("all terms", part, whole, FIRST_WEIGHTS[-1])
-        fit = cheapest(part, whole, [(part.origin, np.zeros(part.d, dtype=bool))])
+        whole = unpruned(tolerant, rows)
+        history.add("all terms", tolerant, whole, FIRST_WEIGHTS[-1])
+        fit = cheapest(tolerant, whole, [(problem.origin, np.zeros(problem.d, dtype=bool))])
         for weight in WEIGHTS:
-            fit = select(part, fit, weight, "subset search", history)
-        found.append(framed(part, fit, history))
-        if not leaves_something_over(part, whole) or history.over:
+            fit = select(tolerant, fit, weight, "subset search", history)
+        fit = framed(tolerant, fit, history)
+        if not leaves_something_over(tolerant, whole) or history.over:
             break
-    fit = min(found, key=lambda fit: fit.criterion)
-    if stretches is problem.stretches:
-        return fit
-    collocation = tolerant.collocation(tolerant.segments())
-    state = replace(fit.state, control_points=fit_curves(collocation, tolerant.curves))
-    fit = tightened(tolerant, collocation, state)
-    return select(tolerant, fit, FINAL_WEIGHT, "subset search, all data", history)
-
-
-def enough(problem: Problem) -> list[tuple[int, Trajectory]]:
-    """The stretches of data, or of long ones so much of each as a search needs."""
-    samples = sum(len(t) for _, (t, _) in problem.stretches)
-    time = sum(t[-1] - t[0] for _, (t, _) in problem.stretches)
-    share = max(ENOUGH_SAMPLES / samples, ENOUGH_TURNS * 2 * np.pi / time)
-    if share > LARGEST_SHARE:
-        return problem.stretches
-    cut = []
-    for i, (t, x) in problem.stretches:
-        end = t[0] + max(share * (t[-1] - t[0]), 2 * np.pi)
-        cut.append((i, (t[t <= end], x[t <= end])))
-    return cut
+    return fit
 
 
 def select(problem: Problem, start: Fit, weight: float, stage: str, history: History) -> Fit:
@@ -242,9 +216,7 @@ def _moved(problem: Problem, fit: Fit, origins: Sequence[Origin], history: Histo
 # ---------------------------------------------------------------------------- the law that persists
 
 
-def persistent(
-    problem: Problem, fit: Fit, history: History, free: bool = True
-) -> tuple[Fit, Path, bool]:
+def persistent(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path, bool]:
     """The law whose terms are those of the widest plateaus of the path around it, and that path.
 
     Parameters
@@ -253,8 +225,6 @@ def persistent(
     fit : Fit
         A first law.
     history : History
-    free : bool
-        Whether an axis that is where the data have it by chance may be freed.
 
     Returns
     -------
@@ -283,10 +253,7 @@ def persistent(
         elif not crossed:
             fit, crossed = bridged(problem, fit, open_gaps), True
         else:
-            state = with_free_axis(problem.cautious, fit.state, path.model, path.tolerated)
-            if not free or state is None:
-                return fit, path, fit.status is Status.CONVERGED
-            fit = replace(fit, state=state)
+            return fit, path, fit.status is Status.CONVERGED
         if not history.another():
             break
     fit = polish(problem, fit if crossed else bridged(problem, fit, open_gaps), history)
@@ -404,29 +371,25 @@ def _restricted(path: Path, active: Bools) -> State:
 def polish(problem: Problem, fit: Fit, history: History, most: int = 4) -> Fit:
     """Refit with the law exact and at the errors it leaves, on finer knots until that is enough.
 
-    Knot spans are halved at ``most`` so often, twice until a law must converge: so much takes a
-    sharp turn that the first knots cannot follow.
+    Knot spans are halved at ``most`` so often, or until a law does not converge on them.
     """
     collocation = problem.along(fit.collocation, fit.state)
-    fit = first = problem.weighted(collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
-    columns, creeps = np.flatnonzero(fit.state.free()), first.status is Status.MAX_STEPS
-    for halving in range(most):
-        if creeps and halving == 2:
-            fit = first
-            break
+    fit = problem.weighted(collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
+    columns = np.flatnonzero(fit.state.free())
+    for _ in range(most):
         before = fit.state.flat()[columns]
         segments = [segment.refined() for segment in fit.collocation.segments]
         finer = problem.collocation(segments, errors_left(problem, fit))
         splines = fit.collocation.grid.splines(fit.state.control_points)
         state = replace(fit.state, control_points=fit_curves(finer, splines))
         fit = problem.weighted(problem.along(finer, state), FINAL_WEIGHT).solve(state, EXACT)
-        creeps = creeps and fit.status is Status.MAX_STEPS
         information = fit.collocation.linearise(fit.state, columns).information
         spread = np.sqrt(np.diag(inverse(information)))
         # Half the spacing, a sixteenth of the error: so much is left of what it just was. Of nearly
         # exact data an error of some ten-millionths is good enough.
         error = np.abs(fit.state.flat()[columns] - before) / 15
-        if (error < np.maximum(0.1 * spread, 3e-7)).all():
+        fine = (error < np.maximum(0.1 * spread, 3e-7)).all()
+        if fine or fit.status is not Status.CONVERGED:
             break
     history.add("polish", problem, fit, FINAL_WEIGHT)
     return fit

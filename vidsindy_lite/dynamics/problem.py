@@ -304,12 +304,11 @@ FINAL_WEIGHT = WEIGHTS[-1]
 """Weight at which the law holds exactly for all that the data can tell."""
 
 
-def unpruned(problem: Problem, rows: Bools) -> tuple[Fit, bool]:
+def unpruned(problem: Problem, rows: Bools) -> Fit:
     """Fit all terms of some rows of the library, (l,), while the physics weight rises.
 
-    And whether all fits converge. Many terms that the data hardly tell apart cannot be fitted at a
-    large weight: such a fit does not converge, and even those before it lean on the terms. Then the
-    first fit is the start.
+    Many terms that the data hardly tell apart cannot be fitted at a large weight: then the first
+    fit that does not converge is the last.
     """
     collocation = problem.collocation(problem.segments())
     control = fit_curves(collocation, problem.curves)
@@ -320,14 +319,13 @@ def unpruned(problem: Problem, rows: Bools) -> tuple[Fit, bool]:
     active = rows[:, None] & problem.form.candidates
     coefficients[~active] = 0.0
     still, shared = np.zeros(problem.d, dtype=bool), problem.form.shared
-    state, fits = State(control, coefficients, active, np.zeros(problem.d), still, shared), []
+    state = State(control, coefficients, active, np.zeros(problem.d), still, shared)
     for weight in FIRST_WEIGHTS:
         fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
-        state = fit.state
-        fits.append(fit)
         if fit.status is not Status.CONVERGED:
-            return fits[0], False
-    return fit, True
+            break
+        state = fit.state
+    return fit
 
 
 def leaves_something_over(problem: Problem, fit: Fit, chance: float = 0.1) -> bool:

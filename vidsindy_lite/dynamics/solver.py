@@ -36,10 +36,6 @@ from .path import ROUNDS, first_law, information_criterion, near, persistent
 from .problem import Problem, pose
 from .result import LIBRARY, NAME, Discovery, History, Path, Swing, swinging
 
-MOST_LAWS = 3
-"""Most laws to which paths are followed: a first, one under process noise, one at larger errors."""
-
-
 _lock = Lock()
 _at_work: list[threadpool_limits] = []  # one for each discovery, the first of which counts
 
@@ -175,8 +171,6 @@ class _Task:
     seed: int
     progress: bool | None
     end: float
-    turned: bool = False
-    """Whether the axes are a guess: a wrong one looks like an origin that is a little off."""
 
     def form(self, order: int) -> Form:
         """That of laws of an order."""
@@ -189,7 +183,7 @@ def _oriented(task: _Task, found: Discovery) -> Discovery:
 
     def solved(turn: Floats) -> Solved:
         measured = in_axes(task.measured, turn)
-        law, problem, fit = _solved(replace(task, measured=measured, turned=True), form)
+        law, problem, fit = _solved(replace(task, measured=measured), form)
         return replace(law, orientation=turn), problem, fit
 
     paths, modes, errors = in_axes(task.measured, np.eye(len(task.names)))
@@ -254,10 +248,11 @@ def _solved(task: _Task, form: Form) -> Solved:
     trajectories, shared, sigma = task.measured
     probes = np.random.default_rng(task.seed)
     problems = views(lambda *how: pose(trajectories, shared, form, probes, sigma, *how))
-    rounds = MOST_LAWS * (1 + ROUNDS) * len(problems)
+    # A first law, one under process noise, and one at larger errors.
+    rounds = 3 * (1 + ROUNDS) * len(problems)
     with bar(task.progress, "discover", total=rounds, leave=False) as shown_bar:
         history = History(end=task.end, bar=shown_bar)
-        laws = [_law(problem, probes, history, not task.turned) for problem in problems]
+        laws = [_law(problem, probes, history) for problem in problems]
         shown_bar.update(rounds - shown_bar.n)
     problem, fit, path = min(laws, key=lambda law: information_criterion(*law[:2]))
     model = path.model if path.fit is fit else problem.model(fit)
@@ -267,7 +262,7 @@ def _solved(task: _Task, form: Form) -> Solved:
 
 
 def _law(
-    problem: Problem, probes: np.random.Generator, history: History, free: bool
+    problem: Problem, probes: np.random.Generator, history: History
 ) -> tuple[Problem, Fit, Path]:
     """The law that persists: the problem as that tells it, the last fit, and the path of laws.
 
@@ -278,14 +273,14 @@ def _law(
     asked = not near(problem, fit, TOLERATED)
     if asked and not history.over:
         problem, fit = _under_process_noise(problem, fit, probes, history) or (problem, fit)
-    fit, path, persists = persistent(problem, fit, history, free)
+    fit, path, persists = persistent(problem, fit, history)
     if not (asked or history.over or near(problem, fit, 0.0)):
         found = _under_process_noise(problem, fit, probes, history)
         if found is not None:
-            return found[0], *persistent(*found, history, free)[:2]
+            return found[0], *persistent(*found, history)[:2]
     if not (persists or problem.has_process_noise or history.over):
         law = first_law(problem, history, path.level)
-        other, around, leads = persistent(problem, law, history, free)
+        other, around, leads = persistent(problem, law, history)
         fit, path = (other, around) if leads else (fit, path)
     return problem, fit, path
 

@@ -500,7 +500,7 @@ NOTHING = "nothing"
 """The solver as it is."""
 
 
-def _first_law_alone(problem: Any, fit: Any, history: Any, free: bool = True) -> Any:
+def _first_law_alone(problem: Any, fit: Any, history: Any) -> Any:
     fit = path.polish(problem, fit, history)
     return fit, path.follow(problem, fit), True
 
@@ -525,7 +525,6 @@ WITHOUT: dict[str, tuple[tuple[Any, str, Any], ...]] = {
     "noise told by all terms": ((solver, "views", lambda pose: [noise.smoother_weights(pose())]),),
     "process noise": ((solver, "with_process_noise", lambda *_: None),),
     "free offset": ((path, "framed", _own),),
-    "offset freed at the end": ((path, "with_free_axis", lambda *_: None),),
     "richer laws": ((path, "deepest", lambda problem, around, history: around),),
 }  # fmt: skip
 """Of each mechanism, what takes the place of what."""
