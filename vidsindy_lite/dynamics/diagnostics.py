@@ -840,10 +840,11 @@ def _far_neighbours(wider: Wider, remedy: str, odds_allowed: float = 0.02) -> It
         out, into = (place(law, columns[k]) if k >= 0 else "" for k in (dropped, added))
         change = f"{into} instead of {out}" if out and into else f"with {into}" if into else ""
         change = change or f"without {out}"
+        by = 100 * (value / present[entry] - 1)
+        becomes = "is zero" if abs(by + 100) < 1 else f"changes by {by:+.2g} %"
         yield (
             f"another law may as well be true ({100 * odds:.0f} %), {change}: there "
-            f"{place(law, columns[entry])} changes by {100 * (value / present[entry] - 1):+.2g} %, "
-            f"far beyond its standard error; use {remedy}"
+            f"{place(law, columns[entry])} {becomes}, far beyond its standard error; use {remedy}"
         )
 
 
