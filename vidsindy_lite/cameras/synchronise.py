@@ -562,13 +562,14 @@ def find_mistake(
                 break
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
             # none.
-            ranked = [(*one.paired(rig.cameras), one) for one in kind(none, rig, names)]
+            each = {one.what: one for one in kind(none, rig, names)}.values()
+            ranked = [(*one.paired(rig.cameras), one) for one in each]
             ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
             # Where a rig is rough, so are the best lags of two views: those that are given count.
             tried = [
                 (one.left(rig, lags), lags, one)
                 for _, best, one in ranked
-                for lags in (start, best)
+                for lags in np.unique([start, best], axis=0)
             ]
             for now, best, one in sorted(tried, key=lambda one: one[0]):
                 # Times by which it has to mend the disagreement of all views together.
