@@ -142,7 +142,7 @@ def _discover(options: argparse.Namespace) -> int:
     # First the law: if the report cannot be written, it is not lost.
     lags = "" if alone else f"; lags of the videos: {list_lags(found.lags.frames)} frames"
     print(f"{found}\nstatus: {found.status}{lags}", flush=True)
-    write_report(found, videos, options.out, told, progress=True)
+    write_report(found, videos, options.out, told)
     print(f"report: {Path(options.out) / PAGE}")
     return 0 if found.status == "ok" else 1
 
@@ -157,8 +157,8 @@ def _found(options: argparse.Namespace, rig: Any, alone: bool) -> Any:
     def given(*names: str) -> dict[str, Any]:
         return {name: getattr(options, name) for name in names}
 
-    shared = given("degree", "seed") | {"progress": True}
-    shared |= {"order": "auto" if options.order == "auto" else int(options.order)}
+    order = "auto" if options.order == "auto" else int(options.order)
+    shared = given("degree", "seed") | {"order": order}
     if alone:
         shared |= given("fps", "detector", *_OF_ONE_VIDEO)
         if options.hint is not None:
@@ -272,9 +272,8 @@ def _demo(options: argparse.Namespace) -> int:
     with tempfile.TemporaryDirectory() as folder:
         print(f"filming {options.system}: three videos of {options.frames} frames ...", flush=True)
         shot = film(options.system, folder, options.frames, options.seed)
-        found = discover_from_videos(
-            shot.paths, shot.rig.uncalibrated(keep=0), shot.t, seed=options.seed, progress=True
-        )
+        forgotten = shot.rig.uncalibrated(keep=0)
+        found = discover_from_videos(shot.paths, forgotten, shot.t, seed=options.seed)
     law = found.discovery
     print("the law, in the frame of the cameras:")
     print(found)
@@ -417,8 +416,8 @@ COMMANDS = {
         ),
         "--out": _words("DIR", "folder of the report (default: report)", default="report"),
         "--lag": _words(
-            "0,L2,L3", "by how many frames of the first video each one starts later; the default "
-            "is to learn it (a first number below zero needs the form --lag=-7,0,0)",
+            "0,L2,L3", "of several videos: how many frames of the first each starts later; "
+            "learned by default (a first number below zero needs the form --lag=-7,0,0)",
             type=numbers
         ),
         "--fps": _words(
@@ -427,9 +426,9 @@ COMMANDS = {
         ),
         "--degree": _count(None, "highest degree of the polynomials (default: 3)"),
         "--library": _words(
-            "TERMS", "in place of --degree: polynomial(N), fourier(N) with the sines and cosines "
-            "of the coordinates, rational(N) with denominators, or a sum such as "
-            "'polynomial(1) + fourier(1)'; then what is known, as in "
+            "TERMS", "of several videos, in place of --degree: polynomial(N), fourier(N) with "
+            "the sines and cosines of the coordinates, rational(N) with denominators, or a sum "
+            "such as 'polynomial(1) + fourier(1)'; then what is known, as in "
             "'polynomial(2); x: y = 10, z = 0' (?: to be found; ...: all others)"
         ),
         "--order": _choice(
@@ -451,8 +450,8 @@ COMMANDS = {
             "ONNX file (default: auto)", default="auto"
         ),
         "--targets": _count(
-            1, "how many targets to follow and to find one law for (default: 1); several are told "
-            "from each other by geometry"
+            1, "of several videos: how many targets to find one law for (default: 1), which "
+            "are told from each other by geometry"
         ),
         "--seed": _count(0, "of the search (default: 0)"),
     }, {"path": "videos", "paths": "videos", "lags": "lag"}),

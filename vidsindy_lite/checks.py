@@ -124,7 +124,7 @@ def check_array(name: str, values: ArrayLike) -> Floats:
             )
         elif isinstance(first, np.timedelta64 | timedelta):
             advice = ": give seconds, np.array(t, 'timedelta64[us]') / np.timedelta64(1, 's')"
-        if array.dtype.kind not in "biufO":
+        if array.dtype.kind not in "iufO":
             raise TypeError
         return np.ma.filled(array.astype(float, copy=False), np.nan)
     except MALFORMED:

@@ -657,8 +657,8 @@ def discover_from_tracks(
     rig, t, lags
         See `observe_tracks`.
     fps : float, optional
-        Frames of every camera in one unit of time, in place of ``t``. Without either, files have
-        to state the times of their rows.
+        Frames of every camera in one unit of time, in place of ``t``, which takes the times of
+        each. Without either, files have to state the times of their rows.
     individual : str, optional
         Which of several targets of the files, by its name there; see `read_tracks`.
     degree, library, order, origin, orientation, seed, progress

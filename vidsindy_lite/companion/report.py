@@ -16,6 +16,7 @@ import base64
 import io
 import json
 import os
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -110,8 +111,11 @@ def check_folder_is_free(folder: str | Path) -> Path:
     whose = "folder" if there == folder else "folder around it"
     if not there.is_dir():
         raise ValueError(f"out: the {whose} must be one that exists, got '{folder}'")
-    if not os.access(there, os.W_OK):
-        raise ValueError(f"out: the {whose} must be writable, got '{folder}'")
+    try:
+        with tempfile.TemporaryFile(dir=there):
+            pass
+    except OSError:
+        raise ValueError(f"out: the {whose} must be writable, got '{folder}'") from None
     strange = [name for name in FILES if (folder / name).exists()]
     if strange and not _is_earlier(folder):
         raise ValueError(
