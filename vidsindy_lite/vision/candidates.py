@@ -539,7 +539,7 @@ class Appearance:
         """Fourier transforms of eight gradients and three colours."""
         grey = cv2.cvtColor(patch, cv2.COLOR_RGB2GRAY).astype(np.float32)
         gx, gy = cv2.Sobel(grey, cv2.CV_32F, 1, 0), cv2.Sobel(grey, cv2.CV_32F, 0, 1)
-        norm = cv2.blur(cv2.magnitude(gx, gy), (9, 9)) + 8
+        norm = cv2.blur(np.hypot(gx, gy), (9, 9)) + 8
         x, y = np.asarray(gx / norm), np.asarray(gy / norm)
         maps = [np.maximum(x * np.cos(a) + y * np.sin(a), 0) for a in np.arange(8) * np.pi / 4]
         lab = cv2.cvtColor(patch, cv2.COLOR_RGB2LAB).astype(np.float32)

@@ -508,12 +508,14 @@ def _filled(
             if known and (part or (like and looks.fit[i] > 0.5 * usual)):
                 pixels[i], confidence[i] = way, rough
                 continue
+        near = at[np.argsort(np.abs(at - i), kind="stable")[:15]]
         if not told and view is not None:  # what hides a part of it draws its looks aside
-            continue
+            of_usual_size = view.area > np.median([views[k].area for k in near]) / 1.5
+            if not (view.inside and of_usual_size):
+                continue
         pointed = seed is not None and i == seed[0]
         if not pointed and not (on[i] and looks.fit[i] > (0.5 if told else 0.7) * usual):
             continue
-        near = at[np.argsort(np.abs(at - i), kind="stable")[:15]]
         near = near[on[near]]
         shift = np.median((found.pixels - alike)[near], axis=0) if len(near) > 2 else 0
         pixels[i], confidence[i] = alike[i] + shift, rough
