@@ -148,6 +148,28 @@ def test_where_an_input_jumps_so_does_the_slope(known, noise):
     assert noise or np.abs(off).max() < 1e-5
 
 
+def test_nothing_is_made_of_the_time_in_which_an_input_jumped():
+    t, x = CLOCK[::4], charged()[::4]  # it jumps between samples
+    with pytest.warns(UserWarning, match="nobody knows when it jumped"):
+        known = Library.inputs(t, {"u": relay(t)})
+    found = vl.discover(t, x, library=Library.polynomial(1) + known)
+    assert (found.status, terms(found.system, "x")) == ("ok", {"x", "u"})
+    kept = found.system.coefficients[found.system.support[:, 0], 0]
+    np.testing.assert_allclose(np.sort(kept), (-0.8, 2.0), atol=1e-5)
+    with pytest.warns(UserWarning, match="jumps"):
+        often = Library.inputs(t, {"u": np.arange(len(t)) // 2 % 2})
+    with pytest.raises(ValueError, match=r"must jump less often .* got 49 jumps"):
+        vl.discover(t, x, library=Library.polynomial(1) + often)
+
+
+def test_runs_that_begin_where_an_input_jumps():
+    ends = np.searchsorted(CLOCK, SWITCHED)
+    runs = list(zip(np.split(CLOCK, ends), np.split(noisy(charged(), 0.02), ends), strict=True))
+    known = Library.inputs(CLOCK, {"u": relay(CLOCK)}, hold="zero")
+    found = vl.discover(runs, library=Library.polynomial(1) + known)
+    assert (found.status, terms(found.system, "x")) == ("ok", {"x", "u"})
+
+
 def test_samples_that_jump_are_held_and_that_is_told():
     with pytest.warns(UserWarning, match="inputs: u jumps, as at t = 5, .*hold='zero'"):
         told = Input.of("u", CLOCK, relay(CLOCK))

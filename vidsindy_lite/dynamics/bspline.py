@@ -126,11 +126,13 @@ class Segment:
     ) -> Segment:
         """A segment with knots at even distances of at most ``spacing`` between jumps of a slope.
 
-        ``jumps`` are times, of which those within the segment count.
+        ``jumps`` are times, of which those within the segment count, and its ends but for rounding.
         """
-        jumps = np.zeros(0) if jumps is None else jumps
-        kinks = jumps[(jumps > t[0]) & (jumps < t[-1])]
-        ends = np.concatenate([t[:1], kinks, t[-1:]])
+        kinks = np.zeros(0) if jumps is None else jumps
+        for end in t[[0, -1]]:
+            kinks = np.where(np.abs(kinks - end) < 1e-9 * (t[-1] - t[0]), end, kinks)
+        kinks = kinks[(kinks >= t[0]) & (kinks <= t[-1])]
+        ends = np.unique(np.concatenate([t[:1], kinks, t[-1:]]))
         spans = np.maximum(1, np.ceil(np.diff(ends) / spacing).astype(int))
         pieces = [np.linspace(*piece) for piece in zip(ends[:-1], ends[1:], spans + 1, strict=True)]
         return cls(t, x, np.unique(np.concatenate(pieces)), trajectory, kinks)
@@ -139,13 +141,14 @@ class Segment:
     def pieces(self) -> list[Floats]:
         """The breakpoints between two kinks, with these: there the curve has all derivatives."""
         cuts = np.searchsorted(self.breakpoints, self.kinks)
-        ends = [0, *cuts.tolist(), len(self.breakpoints) - 1]
-        return [self.breakpoints[low : high + 1] for low, high in pairwise(ends)]
+        ends = np.unique([0, *cuts, len(self.breakpoints) - 1])
+        return [self.breakpoints[low : high + 1] for low, high in pairwise(ends.tolist())]
 
     @property
     def knots(self) -> Floats:
         """The knot vector: a kink is a knot of multiplicity three."""
-        return np.sort(np.concatenate([clamped_knots(self.breakpoints), self.kinks.repeat(2)]))
+        within = np.setdiff1d(self.kinks, self.breakpoints[[0, -1]])
+        return np.sort(np.concatenate([clamped_knots(self.breakpoints), within.repeat(2)]))
 
     def refined(self) -> Segment:
         """The same stretch with every knot span halved."""

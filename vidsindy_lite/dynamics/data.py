@@ -247,16 +247,24 @@ def check_systematic(
     return checked
 
 
-def cut(trajectory: Trajectory, longest_step: float | Floats) -> list[Trajectory]:
-    """Cut a trajectory wherever a coordinate is not seen for longer than ``longest_step``, (d,)."""
+def cut(
+    trajectory: Trajectory, longest_step: float | Floats, unsure: Floats | None = None
+) -> list[Trajectory]:
+    """Cut a trajectory wherever a coordinate is not seen for longer than ``longest_step``, (d,).
+
+    And between ``unsure`` times, (k, 2), where nobody knows what drives it.
+    """
     t, x = trajectory
     longest, kept = np.broadcast_to(longest_step, x.shape[1]), np.ones(len(t), dtype=bool)
     for seen, longest_here in zip(np.isfinite(x).T, longest, strict=True):
         at = np.concatenate([[-np.inf], t[seen], [np.inf]])
         after = np.searchsorted(at, t)
         kept &= seen | (at[after] - at[after - 1] <= longest_here)
+    low, high = np.zeros((2, 0)) if unsure is None else unsure.T
+    kept &= np.searchsorted(low, t) <= np.searchsorted(high, t, side="right")
     t, x = t[kept], x[kept]
     ends = np.flatnonzero(np.diff(t) > longest.min()) + 1
+    ends = np.union1d(ends, np.searchsorted(t, high))
     return list(zip(np.split(t, ends), np.split(x, ends), strict=True))
 
 

@@ -7,7 +7,7 @@ import inspect
 import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import combinations_with_replacement
 from math import comb
@@ -67,6 +67,8 @@ class Function:
     direction : int, optional
         Of a component of a vector, which one it is: the first has the others after it, each stands
         in the equation of its direction alone, and all have one coefficient.
+    unsure : ndarray, shape (k, 2)
+        Times between which it jumps, nobody knows when.
     """
 
     name: str
@@ -74,6 +76,7 @@ class Function:
     value: Callable[[Floats], Floats]
     axes: Sequence[int]
     direction: int | None = None
+    unsure: Floats = field(default_factory=lambda: np.zeros((0, 2)))
 
     @classmethod
     def unknown(cls, name: str) -> Function:
@@ -265,9 +268,12 @@ class Input:
     ----------
     pieces : tuple of CubicSpline or interp1d
         One a trajectory.
+    unsure : ndarray, shape (k, 2)
+        Times of samples between which it jumps, nobody knows when.
     """
 
     pieces: tuple[CubicSpline | interp1d, ...]
+    unsure: Floats
 
     @classmethod
     def of(cls, name: str, t: ArrayLike, values: ArrayLike, hold: str | None = None) -> Input:
@@ -287,7 +293,8 @@ class Input:
             raise ValueError(
                 f"inputs: {name} must be one per trajectory ({len(times)}), got {len(runs)}"
             )
-        pieces = [_curve(name, part, run, hold) for part, run in zip(times, runs, strict=True)]
+        found = [_curve(name, part, run, hold) for part, run in zip(times, runs, strict=True)]
+        pieces = [curve for curve, _ in found]
         ends = sorted((spline.x[0], spline.x[-1]) for spline in pieces)
         for (_, last), (first, _) in zip(ends[:-1], ends[1:], strict=True):
             if not last < first:
@@ -295,7 +302,7 @@ class Input:
                     "inputs: trajectories must have times apart from each other (add a number to "
                     f"those of the second), got one to t = {last:g} and one from t = {first:g}"
                 )
-        return cls(tuple(pieces))
+        return cls(tuple(pieces), np.concatenate([unsure for _, unsure in found]))
 
     def __call__(self, t: Floats) -> Floats:
         """The values at times (n,); NaN where it was not measured, but for rounding at the ends."""
@@ -309,8 +316,10 @@ class Input:
         return values
 
 
-def _curve(name: str, t: Floats, values: Floats, hold: str | None) -> CubicSpline | interp1d:
-    """The curve through samples, which are checked."""
+def _curve(
+    name: str, t: Floats, values: Floats, hold: str | None
+) -> tuple[CubicSpline | interp1d, Floats]:
+    """The curve through samples, which are checked, and between which it jumps at no known time."""
     t, values = check_times(t), check_array("inputs", values)
     if values.shape != t.shape:
         raise ValueError(f"inputs: {name} must have shape {t.shape}, as t has, got {values.shape}")
@@ -319,20 +328,25 @@ def _curve(name: str, t: Floats, values: Floats, hold: str | None) -> CubicSplin
     if not np.isfinite(values).all():
         first = t[np.argmin(np.isfinite(values))]
         raise ValueError(f"inputs: {name} must be finite, got NaN or infinity at t = {first:g}")
-    curve, line = CubicSpline(t, values), interp1d(t, values)
+    curve, line, unsure = CubicSpline(t, values), interp1d(t, values), np.zeros((0, 2))
     if hold is None:
         middles = (t[1:] + t[:-1]) / 2
-        apart = np.abs(curve(middles) - line(middles))
         # Midway a cubic is so far from a line at six samples of a sine a period: more is a guess.
-        hold = "zero" if apart.max() > 0.1 * values.std() else "cubic"
+        guessed = np.abs(curve(middles) - line(middles)) > 0.1 * values.std()
+        hold = "zero" if guessed.any() else "cubic"
         if hold == "zero":
+            jumped = np.abs(np.diff(values)) > 0.1 * values.std()
+            unsure = np.column_stack([t[:-1], t[1:]])[jumped]
             warnings.warn(
                 f"inputs: {name} jumps, as at t = {t[1 + np.abs(np.diff(values)).argmax()]:g}, "
                 "where a cubic through its samples is a guess: the value of each holds until the "
-                "next. Say so by hold='zero', or what is true by 'linear' or 'cubic'",
+                "next, but nobody knows when it jumped since the one before, so that nothing is "
+                "made of what happens between the two. If it jumps at these times say "
+                "hold='zero', or what is true by 'linear' or 'cubic'",
                 stacklevel=2,
             )
-    return {"zero": interp1d(t, values, "previous"), "linear": line, "cubic": curve}[hold]
+    kinds = {"zero": interp1d(t, values, "previous"), "linear": line, "cubic": curve}
+    return kinds[hold], unsure
 
 
 def jumps(value: Callable[[Floats], Floats], t: Floats, halvings: int = 30) -> Floats:
@@ -469,9 +483,10 @@ class Library:
         values : mapping of str to array_like, shape (n,), or list of such
             Names and values; for several trajectories lists.
         hold : {"zero", "linear", "cubic"}, optional
-            What an input is between its samples: the value of the last one (a relay, a controller),
-            a line, or a cubic spline; by default the spline, or, where it jumps, the value of the
-            last one, with a warning.
+            What an input is between its samples: the value of the last one (a controller, which
+            switches at these times), a line, or a cubic spline. By default the spline; or, if it
+            jumps, the value of the last one, with a warning: as it jumped at some time since then,
+            the path is open there, as in a gap.
 
         Raises
         ------
@@ -740,7 +755,8 @@ def own(
         return Function(f"{name}_{of}", f"{latex}_{{{of}}}", lambda x: evaluate(x)[j], axes, j)
 
     if len(shape) == 1:
-        return [Function(name, latex, evaluate, axes)]
+        made = Function(name, latex, evaluate, axes)
+        return [replace(made, unsure=rule.unsure) if isinstance(rule, Input) else made]
     return [component(j) for j in range(measured)]
 
 

@@ -234,7 +234,7 @@ def persistent(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path,
     persists : bool
         Whether the path leads to the law; else it is the last to which one led.
     """
-    open_gaps = gaps(fit.collocation.segments)
+    open_gaps = gaps(fit.collocation.segments, problem.unsure)
     crossed = not open_gaps
     for k in range(ROUNDS):
         coarse = k > 0 or not crossed or not near(problem, fit, TOLERATED)
@@ -443,12 +443,17 @@ Gap = tuple[int, float]
 """A gap is named by its trajectory and the time of the last sample before it."""
 
 
-def gaps(segments: Sequence[Segment]) -> list[Gap]:
-    """The gaps between segments of the same trajectory, shortest first."""
+def gaps(segments: Sequence[Segment], unsure: Floats) -> list[Gap]:
+    """The gaps between segments of the same trajectory, shortest first.
+
+    But for those with one of the ``unsure`` times (k, 2), between which no law tells what happens.
+    """
+    low, high = unsure.T
     lengths = {
         (left.trajectory, left.t[-1]): right.t[0] - left.t[-1]
         for left, right in zip(segments[:-1], segments[1:], strict=True)
         if left.trajectory == right.trajectory
+        and not ((low < right.t[0]) & (left.t[-1] < high)).any()
     }
     return sorted(lengths, key=lengths.__getitem__)
 

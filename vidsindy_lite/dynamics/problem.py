@@ -194,15 +194,23 @@ class Problem:
         """The stretches with their first knots."""
         return [Segment.even(t, x, self.spacing, i, self.jumps[i]) for i, (t, x) in self.stretches]
 
+    @property
+    def unsure(self) -> Floats:
+        """Times between which an input jumps, nobody knows when, (k, 2)."""
+        return self.form.unsure / self.units.time
+
     @cached_property
     def jumps(self) -> list[Floats]:
         """Times at which an input of the law jumps, of each trajectory: there its slope does."""
         at = np.eye(self.d)[-1]  # the time is the last state
         inputs = [lambda t, f=f: f.value(t[:, None] * at) for f in self.functions if f.of_time]
-        return [
-            np.unique(np.concatenate([np.zeros(0), *(jumps(one, t) for one in inputs)]))
-            for t, _ in self.trajectories
-        ]
+        found = []
+        for t, _ in self.trajectories:
+            beside = 1e-11 * (t[-1] - t[0]) * np.array([-1, 1])  # also one that it begins with
+            times = np.concatenate([t[:1] + beside[0], t, t[-1:] + beside[1]])
+            every = [jumps(one, times) for one in inputs]
+            found.append(np.unique(np.concatenate([np.zeros(0), *every])))
+        return found
 
     def collocation(self, segments: Sequence[Segment], noise: Floats | None = None) -> Collocation:
         """Data and physics loss on segments; by default for the noise of the smoothing."""
@@ -484,7 +492,18 @@ def pose(
     trajectories = [
         (t / step, (values.compress(seen, axis=1) - centre) / scale) for t, values in measured
     ]
-    stretches, curves, noise = _smoothed(trajectories, rng, PENALTIES[:1] if through else PENALTIES)
+    unsure = form.unsure / step
+    unsure = np.sort(unsure[np.ptp(unsure, axis=1) > 0.5], axis=0)  # others are known well
+    stretches, curves, noise = _smoothed(
+        trajectories, unsure, rng, PENALTIES[:1] if through else PENALTIES
+    )
+    telling = [len(t) for _, (t, _) in stretches if len(t) >= 4]
+    if len(unsure) and sum(telling) < samples / 2:
+        raise ValueError(
+            "library: an input must jump less often than every few samples, or at times that are "
+            f"known (hold='zero', or samples at these times), got {len(unsure)} jumps of which "
+            "nobody knows when"
+        )
     speed = _rms_speed(curves)
     curves = [BSpline(s.t * speed, s.c, DEGREE, extrapolate=True) for s in curves]
     noise = np.maximum(noise, CLEANEST)
@@ -622,7 +641,7 @@ def _check_independent(form: Form, terms: Floats) -> None:
 
 
 def _smoothed(
-    trajectories: Sequence[Trajectory], rng: np.random.Generator, penalties: Floats
+    trajectories: Sequence[Trajectory], unsure: Floats, rng: np.random.Generator, penalties: Floats
 ) -> tuple[list[tuple[int, Trajectory]], Sequence[BSpline], Floats]:
     """Stretches between gaps, their smoothing splines and the noise; time in typical steps.
 
@@ -631,20 +650,22 @@ def _smoothed(
     seen less often than others pauses later.
     """
     steps = typical_steps(trajectories)
-    first = _stretches(trajectories, 5.0 * steps)
+    first = _stretches(trajectories, 5.0 * steps, unsure)
     smoothed = smooth([piece for _, piece in first], rng, penalties)
     longest = np.maximum(2.5 * steps, GAP / _rms_speed(smoothed.splines))
-    stretches = _stretches(trajectories, longest)
+    stretches = _stretches(trajectories, longest, unsure)
     if [len(t) for _, (t, _) in stretches] != [len(t) for _, (t, _) in first]:
         smoothed = smooth([piece for _, piece in stretches], rng, penalties)
     return stretches, smoothed.splines, smoothed.noise
 
 
 def _stretches(
-    trajectories: Sequence[Trajectory], longest_step: Floats
+    trajectories: Sequence[Trajectory], longest_step: Floats, unsure: Floats
 ) -> list[tuple[int, Trajectory]]:
     pieces = [
-        (i, piece) for i, whole in enumerate(trajectories) for piece in cut(whole, longest_step)
+        (i, piece)
+        for i, whole in enumerate(trajectories)
+        for piece in cut(whole, longest_step, unsure)
     ]
     longest = max(len(t) for _, (t, _) in pieces)
     if longest < 2:
