@@ -208,6 +208,14 @@ def test_a_wrong_length_and_a_wrong_vertical_are_told(monkeypatch):
     assert "degrees off the vertical of the picture" in vertical
 
 
+def test_a_path_that_recedes_looks_like_drag(monkeypatch):
+    filmed(monkeypatch, pixels_of(noisy(flight(drag=0.6)[1], 0)))
+    (doubt,) = vl.discover_from_video("throw.mp4", STICK).warnings
+    assert "is that of a path that recedes as well" in doubt
+    marks = pixels_of(np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])).ravel()
+    assert vl.discover_from_video("throw.mp4", corners=(*marks, 1, 1)).status == "ok"
+
+
 def test_the_command_writes_g_with_its_error(monkeypatch, tmp_path, capsys):
     film = tmp_path / "throw.avi"
     frames = (np.full((720, 1280, 3), 90, np.uint8) for _ in range(2))

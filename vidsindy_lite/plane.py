@@ -199,7 +199,7 @@ def discover_from_video(
         warnings=(), discovery=law if swing is None else swing.law,
         unit=unit, circle=None if swing is None else swing.circle,
     )  # fmt: skip
-    contradicted = _contradicted(found, up is not None or corners is not None)
+    contradicted = _contradicted(found, up is not None or corners is not None, corners is None)
     return replace(found, warnings=(*seen.warnings, *doubts, *contradicted))
 
 
@@ -333,9 +333,15 @@ def _axes(t: Floats, x: Floats) -> Floats:
     return axes[:1] * np.sign(axes[0, np.abs(axes[0]).argmax()])
 
 
-def _contradicted(found: PlaneDiscovery, vertical: bool) -> list[str]:
-    """What the law says against scale, frame rate and vertical."""
+def _contradicted(found: PlaneDiscovery, vertical: bool, askew: bool) -> list[str]:
+    """What the law says against scale, frame rate and vertical, and a plane that may lie askew."""
     doubts, g = [], found.g
+    drags = [str(one) for one in found.discovery.physics() if one.name.startswith("drag")]
+    if drags and askew:
+        doubts.append(
+            f"corners: {', '.join(drags)} is that of a path that recedes as well, as in a plane "
+            "that lies askew: give four marks of a rectangle in the plane"
+        )
     if found.unit == "m" and g is not None:
         times = float(g.value) / EARTH
         if abs(times - 1) * EARTH > SURE * np.hypot(float(g.error), ELSEWHERE):
