@@ -124,3 +124,6 @@ def test_observing_tracks_is_observing_their_videos(shot, monkeypatch):
     assert again.warnings == seen.warnings == ()
     with pytest.raises(ValueError, match=r"t: must have shape \(200,\), one per row of tracks"):
         vl.observe_tracks(seen.tracks, rig, shot.t[1:])
+    shares = [track / shot.rig.cameras[0].image_size for track in seen.tracks]
+    with pytest.raises(ValueError, match=r"tracks: must be in pixels, got tracks.0. with all"):
+        vl.observe_tracks(shares, rig, shot.t)
