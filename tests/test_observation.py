@@ -96,7 +96,8 @@ LOOP = np.column_stack((np.cos(np.arange(200) / 9), np.sin(np.arange(200) / 7)))
 
 def causes(step, *tracks):
     names = [f"{letter}.mp4" for letter, _ in zip("abc", tracks, strict=False)]
-    with pytest.raises(Refused) as caught, refusing(step, tracks, names):
+    outer, inner = (refusing(one, tracks, names) for one in ("law", step))
+    with pytest.raises(Refused) as caught, outer, inner:
         raise ValueError("what is wrong")
     assert caught.value.step == step
     assert len(caught.value.tracks) == len(tracks)
@@ -143,6 +144,23 @@ def test_an_interruption_holds_the_tracks_and_is_no_error_to_be_caught():
     np.testing.assert_array_equal(caught.value.tracks[0], LOOP)
     with pytest.raises(OSError, match="disk"), refusing("law", [LOOP], ["a"]):
         raise OSError("disk")
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"t": range(150), "fps": 9}, "fps: must not be given with t, got 9"),
+        ({"fps": 9, "lags": "synchronous", "still": True}, "tracks: must show a target that moves"),
+    ],
+)
+def test_tracks_need_times_once_and_a_motion(case, more, message):
+    rig, tracks = case
+    if more.pop("still", False):
+        tracks = [np.tile(track[:1], (150, 1)) for track in tracks]
+    with pytest.raises(ValueError, match=message):
+        vl.discover_from_tracks(tracks, rig, **more)
+    with pytest.raises(ValueError, match="names: must be one per track, got 1 for 3"):
+        vl.observe_tracks(tracks, rig, np.arange(150), names=["a"])
 
 
 def test_tracks_of_which_nothing_can_be_learned_come_with_the_refusal(case):

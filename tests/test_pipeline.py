@@ -1,7 +1,5 @@
 """From video files to equations, and what is refused on the way."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -48,34 +46,6 @@ def test_videos_of_different_length_that_start_at_different_times(shot, late):
     assert not any("lags" in warning for warning in found.warnings)
 
 
-def test_given_lags_are_used(shot, late):
-    paths = [late, shot.paths[0], shot.paths[2]]  # the first one is the clock
-    first, second, third = shot.rig.cameras
-    rig = vl.Rig([second, first, third])
-    found = vl.observe(paths, rig, shot.t[7:180], lags=(7, 0, 0))
-    assert found.lags.frames.tolist() == [0, -7, -7]
-    assert found.lags.errors.tolist() == [0, 0, 0]
-    assert max(np.nanmax(np.abs(r)) for r in vl.residuals(found.tracks, found.rig)) < 0.2
-    assert not any("lags" in warning for warning in found.warnings)
-
-
-def test_a_wrong_lag_of_zero_is_not_accepted(shot, late):
-    paths = [shot.paths[0], late, shot.paths[2]]
-    message = r"lags: must make the views agree, got \(0, 0, 0\) frames where \(0, 7, 0\) do"
-    for rig in (shot.rig, shot.rig.uncalibrated()):
-        with pytest.raises(ValueError, match=message):
-            vl.discover_from_videos(paths, rig, lags=(0, 0, 0))
-
-
-def test_different_frame_rates(shot, tmp_path):
-    half = tmp_path / "half.mkv"
-    vl.write_video(half, list(vl.read_video(shot.paths[2]))[::2], fps=12.5)
-    found = vl.observe([*shot.paths[:2], half], shot.rig)
-    np.testing.assert_allclose(found.lags.rates, (1, 1, 0.5))
-    np.testing.assert_allclose(found.lags.frames, 0, atol=0.01)
-    assert np.nanmax(np.abs(found.x - shot.x)) < 5 * shot.rig.cameras[0].scale
-
-
 @pytest.fixture
 def untracked(monkeypatch):
     """No film may be tracked."""
@@ -107,12 +77,6 @@ def test_what_is_cheap_is_checked_before_a_video_is_tracked(
     given = {"paths": shot.paths, "rig": shot.rig} | arguments
     with pytest.raises(ValueError, match=message):
         vl.discover_from_videos(**given, **options)
-
-
-def test_no_film_is_tracked_without_a_calibrated_camera(shot, untracked):
-    cameras = [replace(camera, scale=None, angle=None) for camera in shot.rig.cameras]
-    with pytest.raises(ValueError, match="rig: at least one camera must be calibrated"):
-        vl.discover_from_videos(shot.paths, vl.Rig(cameras))
 
 
 def test_observing_tracks_is_observing_their_videos(shot, monkeypatch):

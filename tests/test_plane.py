@@ -43,12 +43,13 @@ def noisy(x, seed, error=4e-4):
 
 def filmed(monkeypatch, pixels, fps=30.0):
     """As if a film showed the target there."""
-    found = Track(np.asarray(pixels), np.ones(len(pixels)), "motion")
-    monkeypatch.setattr(plane, "track", lambda *what: found)
+    found, asked = Track(np.asarray(pixels), np.ones(len(pixels)), "motion"), []
+    monkeypatch.setattr(plane, "track", lambda *what: asked.append(what) or found)
     monkeypatch.setattr(plane, "frame_clock", lambda path: np.arange(len(pixels), dtype=float))
     monkeypatch.setattr(
         plane, "video_info", lambda path: SimpleNamespace(fps=fps, size=(1280, 720))
     )
+    return asked
 
 
 def pixels_of(x):
@@ -194,6 +195,7 @@ def test_a_swing_is_on_a_circle(monkeypatch):
     assert told == ["vangle", "sin(angle)"]
     assert abs(found.g.value - 9.81) < 2 * found.g.error < 0.6
     assert float(found.period.value) == pytest.approx(2 * np.pi / np.sqrt(9.81 / 0.5), rel=2e-3)
+    np.testing.assert_allclose(found.fitted, found.x, atol=2e-3)
 
 
 def test_a_wrong_length_and_a_wrong_vertical_are_told(monkeypatch):
@@ -220,10 +222,11 @@ def test_the_command_writes_g_with_its_error(monkeypatch, tmp_path, capsys):
     film = tmp_path / "throw.avi"
     frames = (np.full((720, 1280, 3), 90, np.uint8) for _ in range(2))
     vl.write_video(film, frames, fps=30, codec="MJPG")
-    filmed(monkeypatch, pixels_of(noisy(flight()[1], 0)))
+    asked = filmed(monkeypatch, pixels_of(noisy(flight()[1], 0)))
     length = ",".join(map(str, STICK))
     given = ["discover", str(film), "--length", length, "--out", str(tmp_path / "law")]
-    assert main(given) == 0
+    assert main([*given, "--hint", "3,100,90,20,30"]) == 0
+    assert asked == [(str(film), "auto", vl.Hint(frame=3, box=(100, 90, 20, 30)))]
     assert "status: ok" in capsys.readouterr().out
     data = json.loads((tmp_path / "law" / "result.json").read_text("utf-8"))
     assert abs(data["g"]["value"] - 9.81) < 2 * data["g"]["error"] < 0.8

@@ -46,7 +46,7 @@ def test_nested_files_are_refused(tmp_path, name):
     assert main(["rig-import", str(path), "--size", "9x9"]) == 2
 
 
-def test_marks_of_byte_order(tmp_path):
+def test_marks_of_byte_order(tmp_path, monkeypatch):
     rig = vl.Rig.around(np.random.default_rng(0).normal(size=(9, 3)))
     for encoding in ("utf-8-sig", "utf-16"):
         (tmp_path / "rig.toml").write_bytes(rig.text().encode(encoding))
@@ -55,6 +55,9 @@ def test_marks_of_byte_order(tmp_path):
         np.testing.assert_array_equal(read_tracks(tmp_path / "a.csv")[0].pixels, [[1, 2], [3, 4]])
     (tmp_path / "a.csv").write_bytes("Bildé,u,v\n0,1,2\n1,3,4\n".encode("latin-1"))
     np.testing.assert_array_equal(read_tracks(tmp_path / "a.csv")[0].pixels, [[1, 2], [3, 4]])
+    monkeypatch.setattr(storage, "LARGEST_TEXT", 20)
+    with pytest.raises(ValueError, match="tracks: must be a table of numbers of at most 20 bytes"):
+        read_tracks(tmp_path / "a.csv")
 
 
 @pytest.fixture(scope="module")

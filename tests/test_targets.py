@@ -11,6 +11,7 @@ import vidsindy_lite as vl
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.companion.report import write_refusal, write_report
 from vidsindy_lite.pipeline import Refused, _driven, check_found
+from vidsindy_lite.vision import Track
 
 FRAMES, STEP = 200, 0.05
 OWN = np.array([[-0.02, -1.1, 0.0], [1.1, -0.02, 0.7], [0.0, -0.7, -0.02]])
@@ -36,11 +37,27 @@ def films(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def found(films):
-    paths, rig, _ = films
-    return vl.discover_from_videos(paths, rig.uncalibrated(keep=0), targets=2, degree=1)
+    """As if the tracker had seen the targets of each film, in an order of its own."""
+    paths, rig, x = films
+
+    def seen(path, count):
+        camera, rng = rig.cameras[int(path.stem)], np.random.default_rng(int(path.stem))
+        both = [camera.project(one) for one in (x[:, 3:], x[:, :3])][:: rng.choice([1, -1])]
+        both = [one + 0.05 * rng.normal(size=one.shape) for one in both]
+        return tuple(Track(one, np.ones(FRAMES), "motion") for one in both)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(vl.vision, "track_targets", seen)
+        return vl.discover_from_videos(paths, rig.uncalibrated(keep=0), targets=2, degree=1)
 
 
 @pytest.mark.slow
+def test_films_of_both_give_their_paths(films, found):
+    seen = vl.observe(films[0], films[1].uncalibrated(keep=0), targets=2)
+    assert np.nanmax(np.abs(seen.x - found.x)) < 0.03
+    assert np.isfinite(seen.x).all(axis=1).mean() > 0.9
+
+
 def test_the_law_of_both_is_exact(films, found):
     x = films[2]
     order = [0, 1, 2, 3, 4, 5]
@@ -64,7 +81,6 @@ def test_the_law_of_both_is_exact(films, found):
     np.testing.assert_allclose(found.t, np.arange(FRAMES) * STEP, atol=1e-9)
 
 
-@pytest.mark.slow
 def test_the_report_shows_both(films, found, tmp_path):
     page = write_report(found, films[0], tmp_path / "report").read_text("utf-8")
     assert "drives" in page
@@ -110,12 +126,14 @@ def test_laws_of_second_order_name_their_targets_by_places_and_velocities():
         ({"targets": 0}, "targets: must be an integer of at least 1"),
         ({"detector": "learned"}, "targets: 2 are found by detector='auto' alone"),
         ({"hints": [vl.Hint(frame=0, box=(1, 1, 9, 9)), None, None]}, "targets: 2 are found by"),
+        ({"rig": None}, "rig: must be given to tell 2 targets apart, got None"),
+        ({"targets": 1, "hints": [None]}, r"hints: must be one per video \(3\) or None, got"),
     ],
 )
 def test_what_several_targets_need(films, changed, message):
     paths, rig, _ = films
     with pytest.raises(ValueError, match=message):
-        vl.observe(paths, rig, **({"targets": 2} | changed))
+        vl.observe(paths, **({"rig": rig, "targets": 2} | changed))
 
 
 def test_a_film_that_shows_fewer_is_refused_with_all_tracks():

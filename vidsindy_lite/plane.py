@@ -325,9 +325,8 @@ def _law(
 
 def _axes(t: Floats, x: Floats) -> Floats:
     """Those of the plane, or the one along which a path moves that is a line within its noise."""
-    middle = x.mean(axis=0)
-    _, sizes, axes = np.linalg.svd(x - middle, full_matrices=False)
-    noise = smooth([(t, (x - middle) @ axes.T)], np.random.default_rng(0)).noise
+    _, sizes, axes = np.linalg.svd(x - x.mean(axis=0), full_matrices=False)
+    noise = smooth([(t, x @ axes.T)], np.random.default_rng(0)).noise
     if sizes[1] > ASIDE * noise[1] * np.sqrt(len(x)):
         return np.eye(2)
     return axes[:1] * np.sign(axes[0, np.abs(axes[0]).argmax()])

@@ -165,9 +165,8 @@ def _plain(node: Any) -> Any:
     if node.isMap():
         keys = node.keys()
         if {"rows", "cols", "data"} <= set(keys):
-            matrix = node.mat()
-            if matrix is not None:
-                return matrix
+            if "dt" in keys:
+                return node.mat()
             values = np.array(_plain(node.getNode("data")), dtype=float)
             return values.reshape(int(node.getNode("rows").real()), -1)
         return {key: _plain(node.getNode(key)) for key in keys}

@@ -88,6 +88,14 @@ def test_opencv_storage_one_file_a_camera(tmp_path, suffix):
     assert_same(read_calibration(paths), parts)
 
 
+def test_matrices_that_do_not_say_that_they_are_some(tmp_path):
+    text = "%YAML:1.0\n---\nsize: [640, 480]\nR: [0, 0, 0]\nt: [0, 0, 3]\ncamera_matrix:\n"
+    text += "   rows: 3\n   cols: 3\n   data: [500, 0, 320, 0, 500, 240, 0, 0, 1]\n"
+    (tmp_path / "a.yaml").write_text(text)
+    (camera,) = read_calibration([tmp_path / "a.yaml"]).cameras
+    assert camera.focal_length == pytest.approx(500)
+
+
 def listed(parts):
     """The same in lists, as JSON has them."""
     return [{key: np.asarray(value).tolist() for key, value in part.items()} for part in parts]
@@ -170,6 +178,7 @@ def test_the_command_line(tmp_path, capsys):
         ("[metadata]", "[", r"paths: must be a TOML file, got '.*a\.toml': "),
         ("matrix = ", "matrices = ", "must hold a camera matrix"),
         ("matrix = [[", "matrix = [[-", "K: must be"),
+        (", 0.0, 6", ", 3.0, 6", "K: must have no skew, got 3, in"),
         ('name = "1"', "rotation_count = 1", "camera cam_1: rotation_count: must be 0, got 1"),
         ("distortions = [", "distortions = [1, 1, 1, 1, ", "dist: must be k1, k2, p1, p2, k3"),
         ("size = [ 1280, 720,]", "size = [ 1280 ]", r"size: must be .* of shape \(2,\), got"),
@@ -200,6 +209,12 @@ def test_malformed_tables_are_refused_by_name(tmp_path, old, new, message):
         ("a.toml", "a = " + "9" * 400, "must hold numbers of less than 300 digits, got 999"),
         ("a.toml", "a = \udc80", "must be a TOML file in UTF-8, got 'a.toml', which is none"),
         ("a.json", '{"P": 5}', "must hold 11 DLT coefficients"),
+        (
+            "a.json",
+            '{"K": [[1, 0, 1], [0, 1, 1], [0, 0, 1]], "R": [[2, 0, 0], [0, 1, 0], [0, 0, 1]'
+            '], "t": [0, 0, 1]}',
+            "R: must be a rotation, got a matrix that is none",
+        ),
         ("a.json", '{"K": "x", "R": 1, "t": 2}', "K: must be an array of real numbers"),
         ("a.npy", "\udc93NUMPY\x01\0v\0{'descr'", "must be a .npy file of numbers"),
         ("a.xml", "<?xml", "must be a XML file"),
@@ -264,7 +279,7 @@ def test_a_lens_that_nobody_knows_is_told_and_so_are_other_keys(tmp_path):
 
 
 @pytest.mark.parametrize("mark", [{"ignore": True}, {"enabled": False}, {"Disabled": 1}])
-def test_cameras_that_are_to_be_ignored(tmp_path, mark):
+def test_cameras_that_are_to_be_ignored(tmp_path, capsys, mark):
     parts = rooms(5)
     plain = listed(parts)
     plain[1] |= mark
@@ -272,6 +287,8 @@ def test_cameras_that_are_to_be_ignored(tmp_path, mark):
     rig = from_json(tmp_path, plain)
     assert_same(rig, parts[::2])
     assert "this camera is left out" in rig.warnings[0]
+    assert main(["rig-import", str(tmp_path / "a.json")]) == 0
+    assert capsys.readouterr().err == f"warning: {rig.warnings[0]}\n"
 
 
 def test_eight_coefficients(tmp_path):

@@ -115,6 +115,7 @@ def test_bad_camera(change, message):
         PerspectiveCamera(**good | change)
     short = PerspectiveCamera(**good, distortion=(-0.1, 0.02))
     assert short.distortion.tolist() == [-0.1, 0.02, 0, 0, 0]
+    assert short.project(np.zeros((0, 3))).shape == (0, 2)
 
 
 E_Z = np.array([0.0, 0.0, 1.0])

@@ -145,8 +145,10 @@ def test_normal_that_points_away():
         learn_cameras(tracks, Rig([wrong, *rig.uncalibrated(0).cameras[1:]]))
     first, second, third = rig.uncalibrated(0).cameras
     wrong = replace(third, normal=-third.normal)
-    with pytest.raises(ValueError, match="does each normal point from the scene to its camera"):
-        learn_cameras(tracks, Rig([first, second, wrong]))
+    away = [replace(camera, normal=-camera.normal) for camera in rig.cameras]
+    for cameras in ([first, second, wrong], away):
+        with pytest.raises(ValueError, match="does each normal point from the scene to its cam"):
+            learn_cameras(tracks, Rig(cameras))
 
 
 @pytest.mark.filterwarnings("error")

@@ -77,23 +77,14 @@ KINOVEA = (
         "x,y,lost\n10.25,20.5,0\n11,21,0\n3,4,1\n13,23,0\n",
         "frame,x,y,w,h\n0,9.75,20,2,2\n1,10.5,20.5,2,2\n2,-1,-1,-1,-1\n3,12.5,22.5,2,2\n",
         "frame,xmin,ymin,xmax,ymax\n0,9.75,20,11.75,22\n1,10.5,20.5,12.5,22.5\n3,12.5,22.5,14.5,24.5\n",
-        "frame,particle,y,x\n0,4,20.5,10.25\n1,4,21,11\n3,4,23,13\n",
-        GAP,
-        TIMES,
-        DLTDV,
-        DEEPLABCUT,
-        TRACKER_5,
-        TRACKER_6,
-        OURS.replace(",", ";"),
-        OURS.replace(",", "\t"),
-        OURS.replace("\n", "\r\n"),
-        "\ufeff" + OURS,
-        "10.25 20.5\n11 21\nnan nan\n13 23\n",
+        "frame,particle,y,x\n0,4,20.5,10.25\n1,4,21,11\n3,4,23,13\n", GAP, TIMES, DLTDV, DEEPLABCUT,
+        TRACKER_5, TRACKER_6, OURS.replace(",", ";"), OURS.replace(",", "\t"),
+        OURS.replace("\n", "\r\n"), "\ufeff" + OURS, "10.25 20.5\n11 21\nnan nan\n13 23\n",
         "0,10.25,20.5\n1,11,21\n2,,\n3,13,23\n",
         "frame;u;v\n0;10,25;20,5\n1;11;21\n2;;\n3;13,0;23,0\n",
         "Frame, X, Y\n0, 10.25, 20.5\n1, 11, 21\n3, 13, 23\n",
     ],
-)
+)  # fmt: skip
 def test_every_kind_is_read(tmp_path, text):
     (track,) = read(tmp_path, text)
     np.testing.assert_allclose(track.pixels, PIXELS)

@@ -70,7 +70,7 @@ from .models import (
     intersect,
     trimmed,
 )
-from .rig import FINE, GROSS, Rig, check_views, decimals, disagreement, residuals
+from .rig import FINE, GROSS, Rig, decimals, disagreement, residuals
 
 PARTS = {
     "normal": [0, 1],
@@ -525,10 +525,7 @@ def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Cause | None:
     given, learned : Rig
         Before and after `learn_cameras`.
     """
-    views = check_views(tracks, learned)
     errors = np.array([known_to(camera) for camera in given.cameras])
-    if not np.isfinite(intersect(learned.cameras, views)[0]).any():
-        return None
     far = smooth(tracks, learned) and max(disagreement(tracks, learned)) > GROSS
     footage, start = Footage.of(tracks), learned.cameras
     near = adjust(footage, start, np.where(errors > 0, errors, np.inf), most=0)

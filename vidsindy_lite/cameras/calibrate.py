@@ -330,14 +330,14 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     given, rig = rig, posed(tracks, rig)
     views, seen = check_views(tracks, rig), check_seen(tracks, rig)
     errors = np.array([known_to(camera) for camera in rig.cameras])
-    if not errors.any():
-        return Rig(rig.cameras, note=rig.note)
     start = closed_form(views, rig.cameras)
     if not np.isfinite(intersect(start, views)[0]).any():
         raise ValueError(
-            "rig: the lines of sight must meet in front of the perspective cameras, got none that "
-            "do (does each normal point from the scene to its camera?)"
+            "rig: the lines of sight must meet in front of the cameras, got none that do (do two "
+            "views share frames, and does each normal point from the scene to its camera?)"
         )
+    if not errors.any():
+        return Rig(rig.cameras, note=rig.note)
     found = adjust(Footage.of(seen), start, errors)
     doubts = () if rig is given else rig.warnings
     if not found.settled:

@@ -156,10 +156,8 @@ class Curve:
         return np.asarray(np.isfinite(self.track).all(axis=1))
 
     @cached_property
-    def _spline(self) -> BSpline | None:
+    def _spline(self) -> BSpline:
         count = int(self.shown.sum())
-        if not count:
-            return None
         # Where a frame was dropped, a cubic is off by some ten times as much as between two frames.
         degree = 3 if (self.clock == np.arange(len(self.clock))).all() else 5
         seen = self.clock[self.shown], self.track[self.shown]
@@ -171,7 +169,7 @@ class Curve:
         NaN outside, and unless the target is seen in the frames before and after, and these are
         close to each other.
         """
-        if self._spline is None:
+        if not self.shown.any():
             return np.full((*np.shape(frames), 2), np.nan)
         within = np.clip(frames, self.clock[0], self.clock[-1])
         low = np.searchsorted(self.clock, within, "right") - 1
@@ -188,8 +186,6 @@ class Curve:
         Over whole frames, the noise of such a difference does not depend on that of the value
         between them: both ends share as much with it.
         """
-        if self._spline is None:
-            return np.zeros((*np.shape(frames), 2))
         seen = self.clock[self.shown]
         back, on = (np.clip(frames + step, seen[0], seen[-1]) for step in (-1, 1))
         width = np.maximum(on - back, 1)[..., None]
@@ -342,7 +338,7 @@ class Clock:
         times, old, new = self.times, self.frames[0], frames[0]
         if not np.array_equal(new, old):
             step = np.ptp(times) / np.ptp(old)
-            times = times[0] + step * (new - new[0])
+            times = times[0] + step * new
         return Clock(times, rates, frames)
 
     @classmethod

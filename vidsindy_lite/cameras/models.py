@@ -320,9 +320,7 @@ class Camera(ABC):
             self._set(**{name: error})
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Camera):
-            return NotImplemented
-        return self._values == other._values
+        return isinstance(other, Camera) and self._values == other._values
 
     def __hash__(self) -> int:
         return hash(self._values)

@@ -664,17 +664,25 @@ def _cameras(
 ) -> Iterator[tuple[PerspectiveCamera, float]]:
     """The cameras of a file, each with the skew of its pixels."""
     if isinstance(content, np.ndarray):
-        yield from _from_matrices(check_array("array", content), size)
+        yield from _from_matrices(check_array("array", content), _size_of({}, size))
         return
     for name, table in _tables(content, "", warnings):
         try:
             if "K" in table:
                 yield _from_opencv(table, size), 0.0
             else:
-                own = check_image_size(table["size"]) if "size" in table else size
-                yield from _from_matrices(check_array("P", table["P"]), own)
+                yield from _from_matrices(check_array("P", table["P"]), _size_of(table, size))
         except ValueError as error:
             raise ValueError(f"{name}{error}") from None
+
+
+def _size_of(table: dict[str, Any], given: tuple[int, int] | None) -> tuple[int, int]:
+    """Width and height that a table states, or that are given."""
+    size = given if table.get("size") is None else table["size"]
+    if size is None:
+        raise ValueError("image_size: must be given (--size WxH), as this file does not say")
+    width, height = _shaped("size", size, (2,))
+    return check_image_size((round(width), round(height)))
 
 
 def _tables(content: Any, name: str, warnings: list[str]) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -746,11 +754,9 @@ def _table_of(text: str) -> Floats:
 
 
 def _from_matrices(
-    values: Floats, size: tuple[int, int] | None
+    values: Floats, size: tuple[int, int]
 ) -> Iterator[tuple[PerspectiveCamera, float]]:
     """Cameras of DLT coefficients, (11, m), or projection matrices, (3 m, 4) or (m, 3, 4)."""
-    if size is None:
-        raise ValueError("image_size: must be given (--size WxH), as this file does not say")
     if not np.isfinite(values).all():
         raise ValueError("must hold finite numbers, got NaN or infinity")
     if values.ndim == 2 and values.shape[0] == 11:
@@ -807,17 +813,11 @@ def _from_opencv(table: dict[str, Any], given: tuple[int, int] | None) -> Perspe
         rotation = _shaped("R", turned, (3, 3))
         if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-5 or np.linalg.det(rotation) < 0:
             raise ValueError("R: must be a rotation, got a matrix that is none")
-    size = table.get("size")
-    if size is None:
-        size = given
-    if size is None:
-        raise ValueError("image_size: must be given (--size WxH), as this file does not say")
-    width, height = _shaped("size", size, (2,))
     dist = np.trim_zeros(check_array("dist", table.get("dist", [])).ravel(), "b")
     if dist.size > len(LENS):
         raise ValueError(f"dist: must be {', '.join(LENS)}, got {dist.size} coefficients")
     shift = _shaped("t", table["t"], (3,))
-    return _camera(inner, dist, rotation, shift, (round(width), round(height)))
+    return _camera(inner, dist, rotation, shift, _size_of(table, given))
 
 
 def _shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:

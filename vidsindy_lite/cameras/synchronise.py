@@ -348,8 +348,6 @@ def _learned(videos: _Videos, first: Floats) -> Lags:
     if begun is not None and agrees(begun) and (near(begun, first) or not shares(begun).all()):
         return _told(videos, drifted(begun), first)
     loose, sampled = _searched(videos, first)
-    if not sampled:
-        return _untold(videos, first, False)
     close = [s for s in sampled if score(s) <= max(2 * ALIKE * score(sampled[0]), FINE)]
     small = sorted(close, key=_moved)
     chosen = _different(close[:_SHOWN] + small[:_SHOWN])

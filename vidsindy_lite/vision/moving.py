@@ -264,8 +264,6 @@ def _covering(
     Of one that hardly leaves its place a plate with it shows the `rims` only: all that differs
     there is the target's place.
     """
-    if not len(rows):
-        return None
     centre, size = seen.centre[rows], seen.box[rows, 2:]
     inside = (np.abs(centre[:, None] - centre) < size / 2).all(axis=2).mean(axis=1)
     if inside.max() < 0.35:

@@ -341,7 +341,7 @@ def swapped(frames: Ints, areas: Floats) -> int | None:
 
     No target changes like that within a few frames and remains so.
     """
-    logs = np.log2(np.maximum(areas, 1e-3)) / np.log2(_JOINED)
+    logs = np.log2(np.maximum(areas, 1e-3))  # more than one doubling is too much
     most = np.maximum(np.diff(frames) / _BESIDE, 1)
     for first in 1 + np.flatnonzero(np.abs(np.diff(logs)) > most):
         before, after = logs[:first][-_BESIDE:], logs[first:][:_BESIDE]
