@@ -98,6 +98,8 @@ def test_motions_that_are_no_plain_flight():
     assert any("it comes nearer, or the plane lies askew" in doubt for doubt in nearer.warnings)
     straight = homogeneous(t, noisy(np.outer(t, (0.5, 0.2)), 0), ("x", "y"))
     assert straight.equations() == "x'' = 0\ny'' = 0"
+    slowed = homogeneous(t, noisy(np.outer(t - 0.01 * t**2, (0.5, 0.2)), 0), ("x", "y"))
+    assert slowed.warnings[0].startswith("a constant force of 0.01")
     t = np.arange(60) / 30
     swings = np.column_stack([0.1 * np.sin(4 * t), 0.2 * np.cos(6 * t)])
     assert homogeneous(t, noisy(swings, 0), ("x", "y")) is None

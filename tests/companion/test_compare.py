@@ -169,6 +169,7 @@ def notebook(source="print(x)", said="x = 1.0\n", shown="<b>", count=1):
 )
 def test_notebooks_are_compared_by_what_they_say(other, same):
     assert same_notebook(notebook(), notebook(**other)) == same
+    assert not same_notebook(notebook(), nbformat.v4.new_notebook())
 
 
 @pytest.mark.parametrize(

@@ -19,8 +19,6 @@ from vidsindy_lite.companion import run as runner
 from vidsindy_lite.companion.run import NotebookError, execute, run, select_notebooks
 from vidsindy_lite.storage import PACKAGE
 
-pytestmark = pytest.mark.slow  # starts kernels
-
 PLOT = (
     "import matplotlib.pyplot as plt\n\nfigure, axes = plt.subplots()\naxes.plot([0, 1], [0, 1]);"
 )
@@ -157,6 +155,7 @@ def test_only_other_code_is_executed(good, instant, monkeypatch):
     assert executed(run(root=good.root)) == ["01_first", "02_second"]
 
 
+@pytest.mark.slow
 def test_quick_run_goes_to_the_build_folder_only_though_its_kernel_dies_as_it_starts(
     good, monkeypatch, capsys
 ):
@@ -183,6 +182,7 @@ def test_quick_run_goes_to_the_build_folder_only_though_its_kernel_dies_as_it_st
     assert outputs(good) == before
 
 
+@pytest.mark.slow
 def test_notebooks_that_fail_leave_what_was_there(good, monkeypatch, capsys):
     before = outputs(good)
     source = good.write("01_first", MADE, "y = 1\nraise ArithmeticError('seen to fail')")
@@ -226,6 +226,7 @@ def start(tiny):
     return subprocess.Popen(command, cwd=tiny.notebooks, env=here, start_new_session=True)
 
 
+@pytest.mark.slow
 def test_a_run_that_is_killed_leaves_no_process_and_goes_on_later(good, no_kernel):
     before = outputs(good)
     busy = "[os.getpid(), *(process.pid for process in psutil.Process().children())]"

@@ -146,6 +146,8 @@ def test_a_sum_is_a_union():
     assert Library.parse("fourier(1)+ polynomial( 3 )") == both
     fractions = Library.polynomial(2) + Library.rational(1)
     assert Library.parse(str(fractions)) == fractions
+    with pytest.raises(TypeError):
+        both + 3
 
 
 @pytest.mark.parametrize(
@@ -156,6 +158,7 @@ def test_a_sum_is_a_union():
         (Library.terms({"a": lambda q: q}), r"arguments of 'a' must be named .*\(x, y\), .* got q"),
         (Library.fourier(10**6), r"library: must have at most 1000 sines and cosines, got [246]0"),
         (Library.polynomial(60), r"library: must have at most 1000 monomials, got 1891 of degree"),
+        (Library.terms({"a": max}), r"arguments of 'a' must be named .* got none"),
         (Library.terms({"x": lambda x: x**2}), "a term must have a name of its own, got 'x' twice"),
         (Library.terms({"s": lambda x: math.sin(x)}), "'s' must take and return arrays .* Type"),
         (Library.terms({"a": lambda x: 1.0}), r"'a' must return an array of the shape"),

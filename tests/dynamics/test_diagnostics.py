@@ -31,6 +31,13 @@ def duffing():
     return t, x, (problem, fit, path.model, path, found.system)
 
 
+def test_less_than_a_turn_and_a_half_is_told_of_several_runs_too():
+    t = np.linspace(0, 2, 60)
+    x = np.stack([np.cos(t), -np.sin(t)], axis=1)
+    found = discover([(t[:30], x[:30]), (t[30:], x[30:])], degree=1)
+    assert any("turns of the motion" in warning for warning in found.warnings)
+
+
 def far_off(t, x):
     """What is said of samples that no law explains."""
     runs = check_trajectories(t, x)

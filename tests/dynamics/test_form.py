@@ -270,6 +270,8 @@ RUNS, CURVE = [(T, X), (T, X)], np.ones((2, 200, 2))
         ),
         ({"systematic": CURVE[0]}, r"systematic: must have shape \(k, 200, 2\), got \(200, 2\)"),
         ({"systematic": np.nan * CURVE}, "systematic: must be finite where x is"),
+        ({"t": RUNS, "x": None, "systematic": [CURVE]}, "must be one array per trajectory"),
+        ({"t": RUNS, "x": None, "systematic": [CURVE, CURVE[:1]]}, "must hold the same causes"),
         ({"systematic": -1}, r"systematic: must have shape \(k, n, d\), got -1"),
         ({"sigma": 0}, "sigma: must be finite and positive where x is, got 0"),
         (

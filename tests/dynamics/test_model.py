@@ -34,8 +34,8 @@ def test_terms_are_read_in_any_usual_spelling():
         assert law.coefficients[law.terms.index("x^2y"), 0] == 2.0
         assert law.support.sum() == 1
     # Long names are kept apart.
-    law = PolynomialSystem.from_terms({"x1": {"x1 x10": 1}, "x10": {"x10^2": -3}})
-    assert law.terms[-3:] == ("x1^2", "x1 x10", "x10^2")
+    law = PolynomialSystem.from_terms({"x10": {"x10 y": 1}, "y": {"y^2": -3}})
+    assert law.terms[-3:] == ("x10^2", "x10 y", "y^2")
     assert "x_{10}" in law.latex()
 
 
@@ -68,6 +68,9 @@ def test_terms_are_read_in_any_usual_spelling():
                 ((("x",), [[1]], [[1, 2]]), "coefficients: must have shape"),
             ]
         ],
+        (lambda: PolynomialSystem(("x",), [[1]], [[1]], functions=(3,)), "must be of a Library"),
+        (lambda: runge_kutta_4(LINE, [0, 1], [1, 2]), r"x0: must have shape \(1,\) or \(m, 1\)"),
+        (lambda: runge_kutta_4(LINE, [0, 1], [np.inf]), "x0: must be finite, got"),
         (lambda: LINE.simulate([0, 0], [1]), "t: must increase"),
         (lambda: LINE.simulate([0, np.inf], [1]), "t: must be finite, got inf"),
         (lambda: LINE.simulate([0, 1], [1, 2]), "x0: must be 1 finite numbers"),
@@ -120,6 +123,7 @@ def test_value_text_and_latex():
     law = PolynomialSystem.from_terms({"x": {"1": -0.5, "x": 1, "x^2y": -2.25}, "y": {}})
     assert law.text() == "dx/dt = x - 2.25 x^2y - 0.5\ndy/dt = 0"
     assert r"\dot{x} &= x - 2.25\,x^{2} y - 0.5" in law.latex()
+    assert (str(law), law._repr_latex_()) == (law.text(), f"${law.latex()}$")
 
 
 # -------------------------------------------------------------------------------------------- paths

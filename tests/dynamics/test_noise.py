@@ -102,7 +102,7 @@ def test_a_transient_of_few_samples_is_the_laws_and_no_error(slopes, start, nois
 LONG = np.linspace(0.0, 60.0, 1000)
 
 
-def test_law_of_a_kicked_motion_is_found_with_the_size_of_its_kicks(tmp_path):
+def test_law_of_a_kicked_motion_is_found_with_the_size_of_its_kicks():
     rng, kept = np.random.default_rng(11), LAW.support
     x = kicked_path(LAW, LONG, (2.0, 0.0), (0.05, 0.05), rng)
     found = vl.discover(LONG, x + 0.002 * rng.standard_normal(x.shape))
@@ -114,9 +114,6 @@ def test_law_of_a_kicked_motion_is_found_with_the_size_of_its_kicks(tmp_path):
     off = (found.coefficients - LAW.coefficients)[kept]
     assert (np.abs(off / found.standard_errors[kept]) < 4).all()
     assert "process noise: 0.0" in str(found)
-    found.save(tmp_path / "law.json")
-    again = vl.Discovery.load(tmp_path / "law.json")
-    np.testing.assert_array_equal(again.model_error, found.model_error)
 
 
 @pytest.mark.parametrize("kind", ["independent", "lasting", "bent space"])

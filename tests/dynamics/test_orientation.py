@@ -19,7 +19,7 @@ def askew(name, seed, noise=0.0, n=350):
     return t, x @ turn.T + noise * x.std() * rng.normal(size=x.shape), turn.T
 
 
-def test_a_turned_law_is_found_in_its_own_axes(tmp_path):
+def test_a_turned_law_is_found_in_its_own_axes():
     t, x, axes = askew("Lorenz", 1, 0.01)
     found = vl.discover(t, x, degree=2, order=1, orientation="learn")
     assert found.status == "ok"
@@ -34,15 +34,11 @@ def test_a_turned_law_is_found_in_its_own_axes(tmp_path):
     np.testing.assert_array_equal(found.system.support, wanted)
     pulls = np.abs((found.coefficients - truth)[wanted] / found.standard_errors[wanted])
     assert (pulls < 3).all()
-    # Its curve is in its own axes, and they are kept.
+    # Its curve is in its own axes.
     missed = found.curve(t) @ found.orientation - x
     assert np.sqrt(np.mean(missed**2)) < 0.02 * x.std()
     assert "axes: turned, x along (" in str(found)
     assert "the error bars hold theirs" in str(found)
-    found.save(tmp_path / "law.json")
-    np.testing.assert_array_equal(
-        vl.Discovery.load(tmp_path / "law.json").orientation, found.orientation
-    )
 
 
 def test_springs_that_stand_askew_are_found_along_themselves():
@@ -101,7 +97,6 @@ def test_where_no_axes_are_better_those_of_the_data_stay():
     found = vl.discover(t, x, degree=1, order=1, orientation="learn")
     assert found.orientation is None
     assert "orientation: the data's own axes" in found.note
-    assert vl.discover(t, x, degree=1, order=1).note == ""
 
 
 @pytest.mark.parametrize(

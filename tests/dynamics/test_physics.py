@@ -45,9 +45,6 @@ def test_g_its_direction_and_drag():
     assert np.linalg.norm(said["direction"].error) == pytest.approx(turn, rel=1e-5)
     assert said["drag"].value == pytest.approx(0.4)
     assert said["drag"].error == pytest.approx(0.004 / np.sqrt(2), rel=1e-5)
-
-
-def test_g_along_a_direction_that_is_given():
     said = told(FALL, [0, 1, 4, 5], errors=0.01, down=[0, -2])
     assert said["g"].value == pytest.approx(9.8)
     assert said["g"].error == pytest.approx(0.098, rel=1e-5)

@@ -91,10 +91,6 @@ def test_a_discovery_is_saved_and_loaded_digit_for_digit(spring, tmp_path):
     np.testing.assert_array_equal(again.curve(t), found.curve(t))
     np.testing.assert_array_equal(again.native_covariance, found.native_covariance)
     assert again.status == found.status
-    assert [step.stage for step in again.history] == [step.stage for step in found.history]
-    for mine, other in zip(found.path, again.path, strict=True):
-        assert [p.low for p in mine] == [p.low for p in other]
-        assert all((p.terms == q.terms).all() for p, q in zip(mine, other, strict=True))
     again.save(tmp_path / "copy.json")
     assert (tmp_path / "copy.json").read_bytes() == (tmp_path / "law.json").read_bytes()
 
@@ -106,6 +102,19 @@ def test_a_file_that_cannot_be_read_or_written_is_told_with_the_argument(spring,
     for path in (tmp_path, tmp_path / "none" / "law.json"):
         with pytest.raises(ValueError, match="path: must be a file in a folder that exists, got"):
             spring[2].save(path)
+    file = tmp_path / "law.json"
+    spring[2].save(file)
+    content = json.loads(file.read_text())
+    found = content["discovery"]
+    for other, words in (
+        ({"type": "Thing"}, "a type must be one of Discovery"),
+        ([1], "it must hold a Discovery, got tuple"),
+        (found | {"offset": found["absent"]}, "offset must have shape"),
+        (found | {"curves": []}, "it must hold curves"),
+    ):
+        file.write_text(json.dumps(content | {"discovery": other}))
+        with pytest.raises(ValueError, match=f"path: must be a file that .*{words}"):
+            Discovery.load(file)
 
 
 @pytest.mark.parametrize(
@@ -217,14 +226,11 @@ def test_intervals_hold_what_is_absent():
     assert np.mean(weak) > 0.6
 
 
-def test_what_is_there_or_is_no_candidate_has_no_interval(tmp_path):
+def test_what_is_there_or_is_no_candidate_has_no_interval():
     law = found_in(weak_spring(), 0, Library.polynomial(2).where(ALLOWED))
     known = np.isnan(law.absent[..., 0])
     assert known[:, 0].tolist() == [True, True, True, False, True, True]  # x^2 alone is searched
     assert (known[:, 1] == law.native.support[:, 1]).all()
-    law.save(tmp_path / "law.json")
-    again = vl.Discovery.load(tmp_path / "law.json")
-    np.testing.assert_array_equal(again.absent, law.absent)
 
 
 def test_only_data_that_tell_little_leave_terms_unseen():

@@ -94,6 +94,7 @@ def test_an_arc_that_is_passed_once_is_no_circle():
 
 
 def test_an_orbit_that_shrinks_or_is_rich_is_not_too_plain():
+    assert "closed orbit" in told(NAMED["ellipse"][0][:320], t=TIMES[:320])  # two laps of one
     damped = solved(lambda _, s: [s[1], -4 * s[0] - 0.05 * s[1]], [1, 0])
     assert told(damped) == ""
     cycle = solved(lambda _, s: [s[1], -s[0] + 1.5 * (1 - s[0] ** 2) * s[1]], [1, 0], 5 * TIMES)

@@ -28,13 +28,14 @@ def measured(name, noise, n=600, seed=11):
     return truth, t, add_noise(x, noise, np.random.default_rng(seed))
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
-def test_clean_systems_are_recovered_exactly(name):
+@pytest.mark.parametrize(("name", "gap"), [*((one, 250) for one in SYSTEMS), ("NoseHoover", 150)])
+def test_clean_systems_are_recovered_exactly_across_a_gap(name, gap):
     truth, t, x = measured(name, 0.0, n=400)
+    x[gap : gap + 10] = np.nan
     found = discover(t, x)
     result = score(found, truth)
     assert result.exact
-    assert result.l2 < 1e-5
+    assert result.l2 < 1e-6
     assert score(found.native, SYSTEMS[name]).exact
     np.testing.assert_allclose(found.offset, REFERENCE_OFFSET, atol=1e-4)
     assert (found.status, found.note) == ("ok", "")
@@ -96,7 +97,7 @@ def test_conserved_quantities_do_not_hide_the_law(name):
 @pytest.mark.parametrize(("kick", "bridges"), [(0.0, True), (0.03, False)])
 def test_a_gap_in_which_the_target_was_kicked_stays_open(kick, bridges):
     # The kick is small: of a chi-square of thousands it costs some hundreds.
-    t = np.delete(np.linspace(0, 30, 600), slice(290, 330))
+    t = np.delete(np.linspace(0, 30, 600), [*range(120, 150), *range(290, 330)])
     phase = t + kick * (t > 15)
     x = np.stack([np.sin(phase), np.cos(phase)], axis=1)
     found = discover(t, add_noise(x, 0.02, np.random.default_rng(0)), degree=1)
@@ -157,8 +158,7 @@ def test_standard_errors_are_calibrated():
     assert kstest(np.concatenate(scores), "norm").pvalue > 1e-3
 
 
-@pytest.mark.parametrize("persists", [True, False])
-def test_the_progress_bar_knows_its_end(monkeypatch, persists):
+def test_the_progress_bar_knows_its_end(monkeypatch):
     bars = []
 
     class Bar(tqdm):
@@ -166,9 +166,7 @@ def test_the_progress_bar_knows_its_end(monkeypatch, persists):
             bars.append((self.n, self.total))
             super().close()
 
-    followed = solver.persistent
     monkeypatch.setattr(solver, "bar", lambda asked, label, **how: Bar(desc=label, **how))
-    monkeypatch.setattr(solver, "persistent", lambda *a: (*followed(*a)[:2], persists))
     t = np.linspace(0, 12, 200)
     discover(t, np.stack([np.sin(t), np.cos(t)], axis=1), degree=1, progress=True)
     end = 3 * (1 + solver.ROUNDS)
@@ -208,7 +206,7 @@ NOISE = np.random.default_rng(0).normal(size=(200, 3))
     ("x", "options", "message"),
     [
         (NOISE[:20], {}, "x: must hold at least as many samples as unknowns"),
-        (NOISE * [1, 0, 1], {}, "x: every coordinate must move, got a constant column 1"),
+        (NOISE * [1, 1e-12, 1] + [0, 1e3, 0], {}, "must move, got a constant column 1"),
         (NOISE[:, :1], {"degree": "3"}, "degree: must be"),
         (NOISE, {"degree": 2, "library": Library.fourier()}, "degree: must not be given with a li"),
         (NOISE[:, :1], {"time_limit": 0}, "time_limit: must be"),

@@ -97,16 +97,6 @@ def test_seeds_are_local_and_repeatable(name, short_grid):
 
 
 @pytest.mark.parametrize("name", BASELINES)
-def test_degree_and_dimension_are_free(name, short_grid):
-    t = np.linspace(0, 20, 400)
-    x = np.stack([np.cos(t), -np.sin(t)], axis=1)
-    found = BASELINES[name](t, x, degree=1)
-    assert found.names == ("x", "y")
-    assert found.terms == ("1", "x", "y")
-    np.testing.assert_allclose(found.coefficients, [[0, 0], [0, -1], [1, 0]], atol=0.01)
-
-
-@pytest.mark.parametrize("name", BASELINES)
 def test_bad_input(name, short_grid):
     method = BASELINES[name]
     with pytest.raises(ValueError, match="t: must increase"):

@@ -88,6 +88,7 @@ def test_a_spiral_is_found_away_from_its_origin_and_across_a_gap(gap):
     result = score(found, SPIRAL.shift((3, -1)))
     assert result.exact
     assert result.max_coefficient_error < 1e-2
+    assert found.history[0]["iteration"] == 1
     # A linear law has its constants at zero in one frame only, the data's frame has them all.
     shifted = found.native.shift(found.offset)
     kept = np.where(np.abs(shifted.coefficients) < 0.1, 0, shifted.coefficients)

@@ -140,10 +140,7 @@ def homogeneous(
     if classes[best].theta[-1] > 0:  # no drag: it comes nearer; the constant force is doubted
         best -= 1
     flight, richer = classes[best], classes[min(best + 1, len(classes) - 1)]
-    covariance, departure = flight.covariance, _departure(flight, richer)
-    wanted = numbers >= 2 * m  # force and drag
-    if np.diag(departure)[wanted].sum() > np.diag(covariance)[wanted].sum():
-        covariance = departure
+    covariance = _departure(flight, richer)
     penalty = chdtri(1, FALSE_ALARM / (2 * m))
     kept = flight.free & ((flight.theta**2 > penalty * np.diag(covariance)) | (numbers < 2 * m))
     law = Flight.fitted(since, x, kept)

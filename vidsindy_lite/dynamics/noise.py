@@ -280,9 +280,7 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     if like_kicks(kicked, free, rng) < 0.01:
         return None
     exact = _measured_badly(problem, fit, segments)
-    newcomers = int((every.active & ~fit.state.active).sum())  # each of them gains 1 by chance
-    measured = evidence(exact) + prediction_gain(exact).sum()
-    if not evidence(kicked) + 2 * newcomers < measured:
+    if not evidence(kicked) < evidence(exact) + prediction_gain(exact).sum():
         return None
     return _with_variances(problem, kicked.collocation)
 

@@ -281,14 +281,13 @@ def in_sparsest_axes(
 
 def _settled(turn: Floats, solve: Callable[[Floats], Solved]) -> Solved:
     """The law in the best axes near some; of laws alike, the one in the axes that were refined."""
-    solved = best = solve(turn)
+    solved = solve(turn)
     for _ in range(3):  # each law tells the axes better, in which the next is made
-        turn, before = refined(*solved[1:]) @ turn, _rank(solved)
-        solved = solve(turn)
-        best = solved if _rank(solved) <= _rank(best) else best
-        if _rank(solved) >= before:
+        turn, before = refined(*solved[1:]) @ turn, solved
+        solved = min(solve(turn), before, key=_rank)
+        if _rank(solved) == _rank(before):
             break
-    return best
+    return solved
 
 
 def _rank(solved: Solved) -> tuple[bool, int]:

@@ -245,15 +245,16 @@ def persistent(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path,
         if crossed and coarse and has_terms(fit, path.widest()):
             fit, coarse = polish(problem, fit, history), False
             path = follow(problem, fit)
-        if not has_terms(fit, path.widest()):
+        leads = has_terms(fit, path.widest())
+        if leads and crossed:
+            return fit, path, fit.status is Status.CONVERGED
+        if leads or not (crossed or k < ROUNDS // 2):  # without what is in a gap, none may persist
+            fit, crossed = bridged(problem, fit, open_gaps), True
+        else:
             other = refit(problem, path, history)
             if other.status is not Status.CONVERGED and fit.status is Status.CONVERGED:
                 break  # what cannot be fitted is no law
             fit = other
-        elif not crossed:
-            fit, crossed = bridged(problem, fit, open_gaps), True
-        else:
-            return fit, path, fit.status is Status.CONVERGED
         if not history.another():
             break
     fit = polish(problem, fit if crossed else bridged(problem, fit, open_gaps), history)
