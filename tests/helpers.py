@@ -57,19 +57,6 @@ def full_disk(path, *_):
     raise OSError(28, "No space left on device", str(path))
 
 
-def as_before(values, was):
-    """Numbers that hang on all that is worked out must stay, to a thousandth."""
-    np.testing.assert_allclose(np.ravel(values), was, rtol=1e-3)
-
-
-def as_it_was(found, truth, was):
-    """The errors of a track, in pixels: their median and largest, and how sure it is, must stay."""
-    error = np.linalg.norm(found.pixels - truth, axis=1)
-    now = np.nanmedian(error), np.nanmax(error), found.confidence.mean()
-    np.testing.assert_allclose(now, was, atol=5e-4)
-    return error
-
-
 def wait_for(condition):
     """Poll until a condition holds; fail after a minute."""
     deadline = time.monotonic() + 60

@@ -46,6 +46,26 @@ def test_videos_of_different_length_that_start_at_different_times(shot, late):
     assert not any("lags" in warning for warning in found.warnings)
 
 
+def test_given_lags_are_used(shot, late):
+    paths = [late, shot.paths[0], shot.paths[2]]  # the first one is the clock
+    first, second, third = shot.rig.cameras
+    rig = vl.Rig([second, first, third])
+    found = vl.observe(paths, rig, shot.t[7:180], lags=(7, 0, 0))
+    assert found.lags.frames.tolist() == [0, -7, -7]
+    assert found.lags.errors.tolist() == [0, 0, 0]
+    assert max(np.nanmax(np.abs(r)) for r in vl.residuals(found.tracks, found.rig)) < 0.2
+    assert not any("lags" in warning for warning in found.warnings)
+
+
+def test_different_frame_rates(shot, tmp_path):
+    half = tmp_path / "half.mkv"
+    vl.write_video(half, list(vl.read_video(shot.paths[2]))[::2], fps=12.5)
+    found = vl.observe([*shot.paths[:2], half], shot.rig)
+    np.testing.assert_allclose(found.lags.rates, (1, 1, 0.5))
+    np.testing.assert_allclose(found.lags.frames, 0, atol=0.01)
+    assert np.nanmax(np.abs(found.x - shot.x)) < 5 * shot.rig.cameras[0].scale
+
+
 @pytest.fixture
 def untracked(monkeypatch):
     """No film may be tracked."""

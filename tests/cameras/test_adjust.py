@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import aligned_error, as_before, by_hand, dependent, room, shot, trajectory, walk
+from helpers import aligned_error, by_hand, dependent, room, shot, trajectory, walk
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import vidsindy_lite as vl
+from vidsindy_lite import study
 from vidsindy_lite.cameras import Lags, learn_cameras, systematic_errors, tracking_errors
 from vidsindy_lite.cameras.adjust import known_to
 
@@ -19,6 +21,18 @@ def film(seed, cameras=3, n=400, **lens):
     rng = np.random.default_rng(seed)
     rig = room(rng, cameras, **lens)
     return rng, rig, walk(np.arange(n)), shot(rng, rig, np.arange(n))
+
+
+@given(SEEDS, st.integers(3, 5))
+@settings(max_examples=4)
+def test_a_rig_measured_by_hand_becomes_as_good_as_the_true_one(seed, cameras):
+    rng, rig, x, tracks = film(seed, cameras)
+    given_rig = by_hand(rng, rig)
+    learned = learn_cameras(tracks, given_rig)
+    assert learned.warnings == ()
+    best = aligned_error(vl.reconstruct(tracks, rig), x)
+    assert aligned_error(vl.reconstruct(tracks, learned), x) < 1.1 * best + 1e-4
+    assert aligned_error(vl.reconstruct(tracks, given_rig), x) > 2 * best
 
 
 def test_exact_measurements_are_not_touched():
@@ -39,26 +53,26 @@ def test_outliers_do_no_harm():
         track[frames] += 50 * rng.normal(size=(frames.sum(), 2))
     clean = vl.reconstruct(tracks, learn_cameras(tracks, start))
     learned = vl.reconstruct(tracks, learn_cameras(wild, start))
-    as_before([aligned_error(learned, x), aligned_error(clean, x)], [0.0017409, 0.0017224])
+    assert aligned_error(learned, x) < 1.05 * aligned_error(clean, x) + 1e-4
 
 
 @pytest.mark.parametrize(
-    ("seed", "cameras", "lens", "unknown", "was"),
+    ("seed", "cameras", "lens", "unknown"),
     [
-        (3, 4, {"distortion": (-0.1,)}, {"distortion": None, "distortion_error": 0.2},
-         [0.0014499, 0.0014794, 0.0020723]),
-        (4, 3, {"readout": 0.3}, {"readout": 0.0, "readout_error": 0.5},
-         [0.0021882, 0.0021954, 0.0021881]),
+        (3, 4, {"distortion": (-0.1,)}, {"distortion": None, "distortion_error": 0.2}),
+        (4, 3, {"readout": 0.3}, {"readout": 0.0, "readout_error": 0.5}),
     ],
-)  # fmt: skip
-def test_a_lens_and_a_rolling_shutter_are_learned(seed, cameras, lens, unknown, was):
+)
+def test_a_lens_and_a_rolling_shutter_are_learned(seed, cameras, lens, unknown):
     rng, rig, x, tracks = film(seed, cameras, **lens)
     learned = learn_cameras(tracks, by_hand(rng, rig, **unknown))
-    blind = learn_cameras(tracks, by_hand(rng, rig, distortion=None))
-    rigs = rig, learned, blind
-    readouts = [camera.readout for camera in learned.cameras]
-    np.testing.assert_allclose(readouts, lens.get("readout", 0.0), atol=0.15)
-    as_before([aligned_error(vl.reconstruct(tracks, each), x) for each in rigs], was)
+    best = aligned_error(vl.reconstruct(tracks, rig), x)
+    assert aligned_error(vl.reconstruct(tracks, learned), x) < 1.1 * best
+    if "readout" in lens:
+        np.testing.assert_allclose([c.readout for c in learned.cameras], 0.3, atol=0.15)
+    else:
+        blind = learn_cameras(tracks, by_hand(rng, rig, distortion=None))
+        assert aligned_error(vl.reconstruct(tracks, blind), x) > 1.3 * best
 
 
 def test_what_remains_uncertain_is_as_large_as_the_error():
@@ -76,7 +90,7 @@ def test_what_remains_uncertain_is_as_large_as_the_error():
         told = ways @ off.ravel()
         assert np.sum((off.ravel() - told @ ways) ** 2) < 0.05 * np.sum(off**2) + 1e-8
         size.append((told / sizes)[:7] ** 2)
-    as_before(np.mean(size), [1.0708])
+    assert 0.3 < np.mean(size) < 3
 
 
 def test_a_measurement_that_is_far_off_is_told():
@@ -128,12 +142,12 @@ def throw(rng, frames):
 
 
 @pytest.mark.parametrize(
-    ("path", "frames", "memory", "draws", "was"),
+    ("path", "frames", "memory", "draws", "most"),
     # With independent errors taken for granted, the first would spread by 2. In 60 frames, chance
     # alone makes the scores of residuals look like less than their noise.
-    [(trajectory, 250, 0.6, 12, [1.1808, 3.5595]), (throw, 60, 0.0, 40, [0.96768, 2.5295])],
+    [(trajectory, 250, 0.6, 12, 1.3), (throw, 60, 0.0, 40, 1.1)],
 )
-def test_errors_of_cameras_are_as_large_as_stated(path, frames, memory, draws, was):
+def test_errors_of_cameras_are_as_large_as_stated(path, frames, memory, draws, most):
     pulls = []
     for seed in np.random.SeedSequence(5).spawn(draws):
         rng = np.random.default_rng(seed)
@@ -148,7 +162,8 @@ def test_errors_of_cameras_are_as_large_as_stated(path, frames, memory, draws, w
         sizes, *_ = np.linalg.lstsq(modes.reshape(len(modes), -1).T, turned.ravel())
         assert np.abs(turned - np.tensordot(sizes, modes, 1)).max() < 0.02 * np.abs(turned).max()
         pulls.append(sizes)
-    as_before([np.sqrt(np.mean(np.square(pulls))), np.abs(pulls).max()], was)
+    assert 0.8 < np.sqrt(np.mean(np.square(pulls))) < most
+    assert np.abs(pulls).max() < 5
 
 
 def test_trails_follow_the_motion():
@@ -156,8 +171,19 @@ def test_trails_follow_the_motion():
     x, rig, tracks = seen(4, 80, 0.3)
     tracks[1][20] = np.nan
     modes = tracking_errors(tracks, rig)
-    as_before(np.linalg.norm(modes, axis=(1, 2)), [0.36117, 0.33811, 0.35038])
-    assert (np.sum(modes * np.gradient(x, axis=0), axis=2) <= 0).mean() > 0.97
+    assert modes.shape == (3, 80, 3)
+    path = vl.reconstruct(tracks, rig)
+    missed = np.hstack(vl.residuals(tracks, rig))
+    noise = 1.4826 * np.median(np.abs(missed[np.isfinite(missed)])) * np.sqrt(2)  # 6 / (6 - 3)
+    assert 0.2 < noise < 0.4
+    for i, mode in enumerate(modes):
+        behind = [track.copy() for track in tracks]
+        for k in range(1, 79):
+            step = (tracks[i][k + 1] - tracks[i][k - 1]) / 2
+            if np.isfinite(step).all():
+                behind[i][k] = tracks[i][k] - 0.5 * noise * step / np.sqrt(step @ step + noise**2)
+        expected = np.nan_to_num(vl.reconstruct(behind, rig) - path)
+        np.testing.assert_allclose(mode[1:-1], expected[1:-1], atol=1e-9 * np.ptp(x))
 
 
 def test_a_lag_moves_the_path_as_far_as_it_may_be_wrong():
@@ -172,14 +198,16 @@ def test_a_lag_moves_the_path_as_far_as_it_may_be_wrong():
     size = np.sum(mode * speed) / np.sum(speed**2)
     # Slopes between frames hold some noise, and not the same.
     np.testing.assert_allclose(mode[1:-1], size * speed[1:-1], atol=0.1 * np.abs(mode).max())
-    as_before(np.linalg.norm(mode, axis=0), [0.025374, 0.021804, 0.021065])
+    pixels = np.linalg.norm(np.gradient(tracks[1], axis=0), axis=1)
+    # The residuals see part of the motion of one camera, so the error is above noise / speed.
+    least = NOISE / np.sqrt(np.sum(pixels**2))
+    assert least < abs(size) < 5 * least
 
 
 def test_a_clock_that_may_drift_moves_the_path_at_both_ends():
     x, rig, tracks = seen(10, 200)
     lags = Lags(np.zeros(3), np.ones(3), np.zeros(3), 0.0, rate_errors=np.array([0, 1e-4, 0]))
     (mode,) = systematic_errors(tracks, rig, rig, lags)
-    as_before(np.linalg.norm(mode), [0.003707])
     shift = np.linalg.norm(mode, axis=1) / np.linalg.norm(np.gradient(x, axis=0), axis=1)
     assert shift[90:110].max() < 0.2 * np.quantile(shift, 0.9)
     # A lag that is exact, or unknown, moves nothing.
@@ -204,3 +232,15 @@ def test_rounded_tracks_may_lie_beside_the_target():
         np.testing.assert_allclose(modes[::2].sum(axis=0) - 2 * modes[1::2].sum(axis=0), shift)
     with pytest.raises(ValueError, match=r"tracks: must have two frames or more, got \[1, 1, 1\]"):
         tracking_errors([track[:1] for track in tracks], rig)
+
+
+def test_a_law_of_marks_beside_the_target_has_no_terms_of_their_distance():
+    truth = study.SYSTEMS["WangSun"].shift(study.REFERENCE_OFFSET)
+    t, x = truth.trajectory(1000)
+    rig = vl.Rig.around(x)
+    rounded = [np.round(camera.project(x) + np.array([0.05, 0.25])) for camera in rig.cameras]
+    seen = vl.observe_tracks(rounded, rig, t, lags="synchronous")
+    blind = vl.discover(t, seen.x, order=1)
+    told = vl.discover(t, seen.x, systematic=seen.systematic, order=1)
+    assert study.score(blind, truth).false_positives > 0
+    assert study.score(told, truth).exact

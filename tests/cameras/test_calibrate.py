@@ -385,7 +385,6 @@ def test_what_a_hand_cannot_have_measured(tmp_path, old, new, message):
 def test_bad_input_is_named(arguments, message):
     with pytest.raises(ValueError, match=message):
         rig_template(*arguments)
-    assert rig_template(100).count("\n[[camera]]\n") == 100
 
 
 @pytest.mark.parametrize("far", [1.0, 1e6])

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import aligned_error, as_before, far_off, room, shot, walk
+from helpers import aligned_error, far_off, room, shot, walk
 
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import AffineCamera, factorised, learn_cameras_eq4, posed
@@ -55,7 +55,7 @@ def test_a_known_distance_gives_the_unit_of_length():
     distance = float(np.linalg.norm(first - second))
     seen = observe_tracks(tracks, lenses(rng, rig, distance=distance), FRAMES / 30)
     spread = [np.sqrt(np.mean(np.var(x, axis=0))) for x in (seen.x, walk(FRAMES))]
-    as_before([*spread, seen.lags.residual], [0.35526, 0.35324, 0.89221])
+    assert abs(spread[0] / spread[1] - 1) < 0.01
     assert seen.warnings == ()
     assert "the first camera is" in seen.rig.note
 
@@ -65,12 +65,10 @@ def test_small_lags_are_learned_beside():
     rig, late = room(rng, 4), (0, 0.7, -0.9, 0.3)
     tracks = shot(rng, rig, FRAMES, late)
     seen = observe_tracks(tracks, lenses(rng, rig), FRAMES / 30)
+    np.testing.assert_allclose(seen.lags.frames, late, atol=0.1)
     x = walk(FRAMES)
     inside = np.isfinite(seen.x).all(axis=1)
-    as_before(
-        [*seen.lags.frames[1:], 100 * aligned_error(seen.x[inside], x[inside])],
-        [0.73713, -0.93676, 0.26254, 0.15378],
-    )
+    assert aligned_error(seen.x[inside], x[inside]) < 0.005 * np.ptp(x, axis=0).max()
 
 
 def of_lenses(rig, times):
@@ -88,18 +86,17 @@ def blind(rig, known=0):
     )
 
 
-@pytest.mark.parametrize(
-    ("times", "known", "was"),
-    [(1, 1, [0.19451, 1109, 1112, 1101.2]), (6, 0, [0.16701, 6549.6, 6524.1, 6675.4])],
-)
-def test_nothing_is_known_at_all(times, known, was):
+@pytest.mark.parametrize(("times", "known"), [(1, 1), (6, 0)])
+def test_nothing_is_known_at_all(times, known):
     rng = np.random.default_rng([5, times])
     rig = of_lenses(room(rng), times)
     x, tracks = walk(FRAMES), shot(rng, rig, FRAMES)
     learned = vl.learn_cameras(tracks, blind(rig, known))
-    found = [c.focal_length for c in learned.cameras]
-    as_before([100 * aligned_error(vl.reconstruct(tracks, learned), x), *found], was)
+    assert aligned_error(vl.reconstruct(tracks, learned), x) < 0.005 * np.ptp(x, axis=0).max()
     assert "focal lengths are those that the tracks tell" in learned.note
+    if times == 1:
+        found = [c.focal_length for c in learned.cameras]
+        np.testing.assert_allclose(found, [c.focal_length for c in rig.cameras], rtol=0.05)
 
 
 def test_from_infinity_either_hand_fits():
@@ -108,8 +105,8 @@ def test_from_infinity_either_hand_fits():
     x, tracks = walk(FRAMES), shot(rng, rig, FRAMES)
     learned = vl.learn_cameras(tracks, blind(rig))
     assert any("true one or its mirror image" in text for text in learned.warnings)
-    found = vl.reconstruct(tracks, learned)
-    as_before(min(aligned_error(found * [1, 1, hand], x) for hand in (1, -1)), [0.0015566])
+    found, size = vl.reconstruct(tracks, learned), np.ptp(x, axis=0).max()
+    assert min(aligned_error(found * [1, 1, hand], x) for hand in (1, -1)) < 0.01 * size
 
 
 def test_a_file_of_lenses(tmp_path):
@@ -163,19 +160,14 @@ def far_away(views=3, moving=3, noise=0.2, count=240, seed=0):
     return tracks, vl.Rig(tuple(vl.PerspectiveCamera() for _ in range(views)))
 
 
-@pytest.mark.parametrize(
-    ("views", "moving", "was"),
-    [
-        (3, 2, [17.4, -8, 0.015177, 0.015983, 0.18179]),
-        (4, 3, [17.412, -7.9878, 5.5099, 0.0083489, 0.0084707, 0.0087609, 0.17957]),
-    ],
-)
-def test_lags_and_axes_of_motion(views, moving, was):
+@pytest.mark.parametrize(("views", "moving"), [(3, 2), (4, 3)])
+def test_lags_and_axes_of_motion(views, moving):
     tracks, rig = far_away(views, moving)
     found = factorised(tracks, rig, np.ones(views), None)
     assert found.moving == moving
     np.testing.assert_allclose(found.lags.frames, LAGS[:views], atol=0.1)
-    as_before([*found.lags.frames[1:], *found.lags.errors[1:], found.lags.residual], was)
+    assert (found.lags.errors[1:] < 0.05).all()
+    assert found.lags.residual < 0.3
 
 
 def test_views_of_different_things_do_not_agree():

@@ -172,7 +172,7 @@ def test_a_sum_is_a_union():
             r"library: a must be finite on the data, got no such value at \(1, ",
         ),
         (
-            Library.polynomial(1) + Library.inputs([0, 2, 9], {"u": [1, 0, 2]}),
+            Library.polynomial(1) + Library.inputs([0, 2, 9], {"u": [1, 0, 2]}, hold="linear"),
             "library: u must be finite on the data, got no such value at t = 9.03",
         ),
         (

@@ -4,11 +4,10 @@ import cv2
 import numpy as np
 import pytest
 from footage import Phone, render_phone, write_phone
-from helpers import as_before
 
 from vidsindy_lite import track
 from vidsindy_lite.vision.background import carry, sample_frames, sampled
-from vidsindy_lite.vision.camera import Look, camera_motion, stands_still, steadied
+from vidsindy_lite.vision.camera import CameraMotion, Look, camera_motion, stands_still, steadied
 from vidsindy_lite.vision.camera import align as align_on
 from vidsindy_lite.vision.video import Reel, write_video
 
@@ -20,10 +19,8 @@ def test_the_frames_of_a_camera_that_trembles_before_a_sky_lie_in_the_first(tmp_
     motion, sure = camera_motion(film, sample_frames(film), sampled(60))
     error = np.linalg.norm(carry(motion.maps, there) - here, axis=1)
     assert sure
-    as_before(
-        [np.median(error), np.sqrt(np.mean(error**2)), motion.errors.mean()],
-        [0.052599, 0.078998, 0.043664],
-    )
+    assert np.median(error) < 0.2 * np.median(np.linalg.norm(there - here, axis=1))
+    assert np.sqrt(np.mean(error**2)) < 2 * np.sqrt(2 * np.mean(motion.errors**2))
 
 
 SIZE = 960, 720
@@ -47,15 +44,6 @@ def test_a_plane_that_is_seen_more_from_the_side_has_a_map_of_eight_numbers():
     found = followed(grains(), cv2.warpPerspective(grains(), tilt, SIZE, flags=cv2.INTER_CUBIC))
     corners = np.array([[100, 100], [860, 100], [860, 620], [100, 620.0]])
     np.testing.assert_allclose(carry(found, corners), carry(tilt, corners), atol=0.2)
-
-
-def test_what_a_key_frame_hardly_shows_is_located_in_the_last_one_that_is_known():
-    wide = np.hstack([grains(0)[:480], grains(1)[:480]])
-    wide[:, 300:680] = 128  # of the first view only plain ground is left in the end
-    along = np.arange(0, 420, 30)
-    motion = steadied([wide[:, left : left + 640] for left in along], 1)
-    np.testing.assert_allclose(motion.maps[:, 0, 2], along, atol=0.05)
-    assert motion.errors.max() < 0.01
 
 
 @pytest.mark.parametrize(("share", "still"), [(0.0, False), (0.2, False), (0.45, True), (1, True)])
@@ -82,6 +70,22 @@ def test_what_one_large_thing_shares_is_its_own_motion_not_the_cameras(width, to
 
     frames = [frame(place) for place in range(4)]
     assert (stands_still(frames) is False) == told
+
+
+def test_reduced_maps_and_their_errors_become_those_of_whole_pixels():
+    shift = np.array([[1, 0, 2], [0, 1, -3], [0, 0, 1.0]])
+    tilt = np.array([[1, 0, 0], [0, 1, 0], [0.001, 0, 1.0]])
+    maps = np.array([np.eye(3), shift, np.diag([1.2, 0.9, 1]), 2 * tilt])
+    motion = CameraMotion.of(maps, np.array([0.0, 0.25, 1, np.inf]), 4)
+    np.testing.assert_allclose(motion.errors, [0, 1, 4, np.inf])
+    assert motion.moves
+    # The reduced pixels (10, 20) lie at (41.5, 81.5), in the middle of four by four.
+    for here, (u, v) in zip(
+        motion.maps, [(10, 20), (12, 17), (12, 18), (10 / 1.01, 20 / 1.01)], strict=True
+    ):
+        end = carry(here, np.array([[41.5, 81.5]]))[0]
+        np.testing.assert_allclose(end, [4 * u + 1.5, 4 * v + 1.5])
+        assert here[2, 2] == pytest.approx(1)
 
 
 CLOUDY = 320, 240
@@ -116,21 +120,21 @@ def about_the_middle(**change):
 
 
 @pytest.mark.parametrize(
-    ("move", "light", "was"),
+    ("move", "light"),
     [
-        (about_the_middle(turn=0.06), 1.0, [0.013084, 0.0078643]),
-        (about_the_middle(scale=1.05), 1.0, [0.010393, 0.0075348]),
-        (similar(0.7, -0.4), 1.0, [0.0090448, 0.0070266]),
-        (similar(-6, 9, 0.01), 1.1, [0.0078983, 0.020519]),
-        (similar(14, -3, -0.02, 1.01), 0.8, [0.01703, 0.042624]),
+        (about_the_middle(turn=0.06), 1.0),
+        (about_the_middle(scale=1.05), 1.0),
+        (similar(0.7, -0.4), 1.0),
+        (similar(-6, 9, 0.01), 1.1),
+        (similar(14, -3, -0.02, 1.01), 0.8),
     ],
-)  # fmt: skip
-def test_shift_turn_and_scale_of_clouds(move, light, was):
+)
+def test_shift_turn_and_scale_of_clouds(move, light):
     found = align(sight(0), sight(0, move, light=light))
     points = np.array([[40, 40, 1], [280, 40, 1], [160, 120, 1], [280, 200, 1.0]])
     miss = np.linalg.norm((points @ (found.map - move).T)[:, :2], axis=1)
     assert miss.max() < 0.1
-    as_before([miss.mean(), found.error], was)
+    assert miss.mean() <= 8 * found.error < 0.5
 
 
 def test_what_moves_on_its_own_is_left_aside():
@@ -140,11 +144,6 @@ def test_what_moves_on_its_own_is_left_aside():
         view[60:180, left : left + 60] = (20, 20, 160)  # a large thing that goes elsewhere
     found = align(*views)
     assert np.linalg.norm(found.map[:2, 2] - move[:2, 2]) < 0.5
-
-
-def test_views_that_have_little_in_common_tell_no_motion():
-    far = similar(250, 0)
-    assert align_on(Look(sight(0)).grounds, Look(sight(0, far)).levels, far) is None
 
 
 @pytest.mark.parametrize("things", [0, 3])

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import as_before
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -120,12 +119,6 @@ def test_a_seed_gives_the_same_frames_and_file_and_another_seed_others(tmp_path)
     assert scene == Scene.random(np.random.default_rng(7), **fixed) != Scene.random(4, **fixed)
     track = [[40.0, 40.0], [50.0, 42.0]]
     first, again, other = (list(render(track, scene, seed)) for seed in (1, 1, 2))
-    moves = replace(scene, turns=2.0, tumbling=3.0, size_variation=0.4, trees=((4, 4, 40, 60),))
-    frames = np.array(list(render(np.tile([60.0, 40.0], (9, 1)), moves)), float)
-    as_before(
-        [frames.mean(), frames.std(), np.abs(np.diff(frames, axis=0)).mean()],
-        [122.46, 60.466, 34.012],
-    )
     assert np.array_equal(first, again)
     assert not np.array_equal(first[0], other[0])
     path = render_video(tmp_path / "clip.mkv", track, scene, seed=1)
@@ -190,13 +183,24 @@ def test_of_several_targets_the_later_ones_are_in_front():
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("background", "moon"), ("shape", "cube"), ("colour", "teal"), ("size", 2),
-        ("turns", np.inf), ("tumbling", -1), ("size_variation", 0.9), ("noise_variance", -0.1),
-        ("shape_seed", -1), ("turns", "many"), ("image_size", (10, 10)),
-        ("occluders", ((1, 2, 3),)), ("occluders", ((0, 1, 4, 512),)),
-        ("occluders", ((-1, 0, 9, 9),)), ("trees", ((1, 2, 3),)), ("trees", ((0, 500, 50, 50),)),
+        ("background", "moon"),
+        ("shape", "cube"),
+        ("colour", "teal"),
+        ("size", 2),
+        ("turns", np.inf),
+        ("tumbling", -1),
+        ("size_variation", 0.9),
+        ("noise_variance", -0.1),
+        ("shape_seed", -1),
+        ("turns", "many"),
+        ("image_size", (10, 10)),
+        ("occluders", ((1, 2, 3),)),
+        ("occluders", ((0, 1, 4, 512),)),
+        ("occluders", ((-1, 0, 9, 9),)),
+        ("trees", ((1, 2, 3),)),
+        ("trees", ((0, 500, 50, 50),)),
     ],
-)  # fmt: skip
+)
 def test_scene_rejects(field, value):
     with pytest.raises(ValueError, match=f"^{field}: must|^{field}: each must"):
         Scene(**{field: value})

@@ -500,9 +500,8 @@ def pose(
     telling = [len(t) for _, (t, _) in stretches if len(t) >= 4]
     if len(unsure) and sum(telling) < samples / 2:
         raise ValueError(
-            "library: an input must jump less often than every few samples, or at times that are "
-            f"known (hold='zero', or samples at these times), got {len(unsure)} jumps of which "
-            "nobody knows when"
+            "library: an input must jump less often than every few samples, or hold must say what "
+            f"it is between its own, got {len(unsure)} jumps of which nobody knows when"
         )
     speed = _rms_speed(curves)
     curves = [BSpline(s.t * speed, s.c, DEGREE, extrapolate=True) for s in curves]
