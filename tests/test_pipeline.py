@@ -111,3 +111,5 @@ def test_observing_tracks_is_observing_their_videos(shot, monkeypatch):
     shares = [track / shot.rig.cameras[0].image_size for track in seen.tracks]
     with pytest.raises(ValueError, match=r"tracks: must be in pixels, got tracks.0. with all"):
         vl.observe_tracks(shares, rig, shot.t)
+    with pytest.raises(ValueError, match=r"tracks.1.: must see the target in some frame"):
+        vl.observe_tracks([seen.tracks[0], np.nan * shares[1], seen.tracks[2]], rig, shot.t)

@@ -234,7 +234,8 @@ def observe_tracks(
     if len(names) != len(raw):
         raise ValueError(f"names: must be one per track, got {len(names)} for {len(raw)}")
     for name, track, camera in zip(names, raw, rig.cameras, strict=True):
-        if (np.abs(track[np.isfinite(track)]) <= 1).all():
+        seen = track[np.isfinite(track)]
+        if seen.size and (np.abs(seen) <= 1).all():
             raise ValueError(
                 f"tracks: must be in pixels, got {name} with all places between -1 and 1: if they "
                 f"are shares of the image multiply them by its size, {camera.image_size}"

@@ -330,15 +330,14 @@ def _curve(
         raise ValueError(f"inputs: {name} must be finite, got NaN or infinity at t = {first:g}")
     curve, line, unsure = CubicSpline(t, values), interp1d(t, values), np.zeros((0, 2))
     if hold is None:
-        middles = (t[1:] + t[:-1]) / 2
+        middles, steps = (t[1:] + t[:-1]) / 2, np.abs(np.diff(values))
         # Midway a cubic is so far from a line at six samples of a sine a period: more is a guess.
-        guessed = np.abs(curve(middles) - line(middles)) > 0.1 * values.std()
-        hold = "zero" if guessed.any() else "cubic"
+        much = 0.1 * values.std()
+        hold = "zero" if (np.abs(curve(middles) - line(middles)) > much).any() else "cubic"
         if hold == "zero":
-            jumped = np.abs(np.diff(values)) > 0.1 * values.std()
-            unsure = np.column_stack([t[:-1], t[1:]])[jumped]
+            unsure = np.column_stack([t[:-1], t[1:]])[steps > much]
             warnings.warn(
-                f"inputs: {name} jumps, as at t = {t[1 + np.abs(np.diff(values)).argmax()]:g}, "
+                f"inputs: {name} jumps, as at t = {t[1 + steps.argmax()]:g}, "
                 "where a cubic through its samples is a guess: the value of each holds until the "
                 "next, but nobody knows when it jumped since the one before, so that nothing is "
                 "made of what happens between the two. If it jumps at these times say "

@@ -815,11 +815,6 @@ class Form:
         return self.law(self.known).implicit
 
     @property
-    def unsure(self) -> Floats:
-        """Times between which a function jumps, nobody knows when, (k, 2)."""
-        return np.concatenate([np.zeros((0, 2)), *(f.unsure for f in self.functions)])
-
-    @property
     def degree(self) -> int:
         """The highest degree among the candidates; a function counts as a variable."""
         return int(self.exponents[self.candidates.any(axis=1)].sum(axis=1).max())

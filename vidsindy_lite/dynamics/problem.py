@@ -71,6 +71,8 @@ class Problem:
     process_noise : ndarray, shape (d,)
         What random kicks leave of each equation, root mean square over a sample; zero for a law
         that holds exactly.
+    unsure : ndarray, shape (k, 2)
+        Times between which an input jumps, nobody knows when; no law is asked for there.
     measured_errors : bool
         Whether noise and precision are given by the user, and not to be estimated.
     """
@@ -89,6 +91,7 @@ class Problem:
     penalties: Floats
     slack: Floats
     process_noise: Floats
+    unsure: Floats
     measured_errors: bool = False
 
     @property
@@ -193,11 +196,6 @@ class Problem:
     def segments(self) -> list[Segment]:
         """The stretches with their first knots."""
         return [Segment.even(t, x, self.spacing, i, self.jumps[i]) for i, (t, x) in self.stretches]
-
-    @property
-    def unsure(self) -> Floats:
-        """Times between which an input jumps, nobody knows when, (k, 2)."""
-        return self.form.unsure / self.units.time
 
     @cached_property
     def jumps(self) -> list[Floats]:
@@ -492,7 +490,7 @@ def pose(
     trajectories = [
         (t / step, (values.compress(seen, axis=1) - centre) / scale) for t, values in measured
     ]
-    unsure = form.unsure / step
+    unsure = np.concatenate([np.zeros((0, 2)), *(f.unsure for f in form.functions)]) / step
     unsure = np.sort(unsure[np.ptp(unsure, axis=1) > 0.5], axis=0)  # others are known well
     stretches, curves, noise = _smoothed(
         trajectories, unsure, rng, PENALTIES[:1] if through else PENALTIES
@@ -546,6 +544,7 @@ def pose(
         penalties=term_penalties(form.exponents, len(seen)),
         slack=np.ones(d),
         process_noise=np.zeros(d),
+        unsure=unsure * speed,
         measured_errors=sigma is not None,
     )
     if problem.shared:

@@ -50,7 +50,7 @@ from .candidates import (
     plainest_paths,
     uncommon,
 )
-from .refining import Lens, View, entire, fitting, hidden, roughness, swapped
+from .refining import WHOLE, Lens, View, entire, fitting, hidden, roughness, swapped
 from .video import Reel, reduce
 
 _SHORTEST = 5  # frames of a path
@@ -508,7 +508,7 @@ def _filled(
                 continue
         near = at[np.argsort(np.abs(at - i), kind="stable")[:15]]
         if not told and view is not None:  # what hides a part of it draws its looks aside
-            of_usual_size = view.area > np.median([views[k].area for k in near]) / 1.5
+            of_usual_size = view.area > np.median([views[k].area for k in near]) / WHOLE
             if not (view.inside and of_usual_size):
                 continue
         pointed = seed is not None and i == seed[0]

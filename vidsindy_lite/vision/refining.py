@@ -26,7 +26,7 @@ from .background import Plate, dot, hull, least_difference, lengths, relit, shad
 _CELLS = 32  # into which the side of a target is cut
 _REACH = 1.5  # sides of the target from its middle that its usual outline may have
 _UNEVEN = 0.12  # share by which a shadow may darken the colours of a pixel unlike each other
-_WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
+WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
 _AROUND = 9  # views around one that say how large it should be
 _MOSTLY = 0.8  # share of the views that must show it whole
 _JOINED = 2.0  # factor by which the area grows at once where a target meets something like it
@@ -252,7 +252,7 @@ def entire(views: Sequence[View | None]) -> tuple[list[View | None], tuple[str, 
     if not turns or np.median(areas[:, 0] / areas[:, 1]) > 0.9:
         return parts, ()
     size = np.log(areas[:, 1])
-    keeps = np.abs(size - median_filter(size, _AROUND)) < np.log(_WHOLE)
+    keeps = np.abs(size - median_filter(size, _AROUND)) < np.log(WHOLE)
     if keeps.mean() > _MOSTLY:
         return [one and (one.whole or one) for one in views], ()
     return parts, ("the target has several colours, or touches other things: perhaps only a part "
@@ -297,7 +297,7 @@ def fitting(
         if len(use) < 3:
             return good & telling
         usual = np.interp(frames, frames[use], median_filter(logs[use], _AROUND, mode="mirror"))
-        good = inside & (np.abs(logs - usual) < np.log(_WHOLE))
+        good = inside & (np.abs(logs - usual) < np.log(WHOLE))
     # Of its size, by which a view may be off the way.
     room = np.where(telling, 0.3 * np.sqrt(areas), 0)
     while (use := np.flatnonzero(good)).size >= 7:
@@ -332,7 +332,7 @@ def joined(areas: Floats) -> Bools:
         before, after = areas[max(first - _BESIDE, 0) : first], areas[last + 1 :][:_BESIDE]
         if min(len(before), len(after)) == _BESIDE:
             usual = max(np.median(before), np.median(after))
-            found[first : last + 1] = np.median(areas[first : last + 1]) > _WHOLE * usual
+            found[first : last + 1] = np.median(areas[first : last + 1]) > WHOLE * usual
     return found
 
 
@@ -341,7 +341,7 @@ def swapped(frames: Ints, areas: Floats) -> int | None:
 
     No target changes like that within a few frames and remains so.
     """
-    logs = np.log2(np.maximum(areas, 1e-3))  # more than one doubling is too much
+    logs = np.log2(np.maximum(areas, 1e-3)) / np.log2(_JOINED)
     most = np.maximum(np.diff(frames) / _BESIDE, 1)
     for first in 1 + np.flatnonzero(np.abs(np.diff(logs)) > most):
         before, after = logs[:first][-_BESIDE:], logs[first:][:_BESIDE]
