@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers import moving, noisy, solved
+from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
 from vidsindy_lite.dynamics import discover
@@ -155,6 +156,41 @@ def moved(flow, origin, error, level, draw=0, n=1500):
     truth = FLOWS[flow].shift(origin)
     t, x = truth.trajectory(n)
     return truth, discover(t, error(x, level, np.random.default_rng(draw)))
+
+
+def duffings(*stiffness, noise):
+    """A run of a hardening spring for each stiffness, from starts of their own, in noise."""
+    laws = [{"x": {"y": 1}, "y": {"x": -k, "x^3": -0.3, "y": -0.1}} for k in stiffness]
+    t, rng = np.linspace(0, 20, 300), np.random.default_rng(7)
+    runs = [
+        PolynomialSystem.from_terms(law).simulate(t, (1 + i / 2, 0)) for i, law in enumerate(laws)
+    ]
+    return [(t, add_noise(x, noise, rng)) for x in runs]
+
+
+def differing(found):
+    """Which part of the data is said to have other coefficients."""
+    return [w.split(" has other coeff")[0] for w in found.warnings if "other coefficients" in w]
+
+
+@pytest.mark.parametrize("noise", [0.03, 0.1])
+@pytest.mark.parametrize(
+    ("stiffness", "told"), [((1, 1, 1.05), ["run 2"]), ((1, 1.12, 1), ["run 1"]), ((1, 1, 1), [])]
+)
+def test_runs_of_different_systems_are_told(stiffness, told, noise):
+    assert differing(discover(duffings(*stiffness, noise=noise))) == told
+
+
+@pytest.mark.parametrize(("last", "told"), [(1, []), (1.15, ["the second half of the data"])])
+def test_a_coefficient_that_changes_with_time_is_told(last, told):
+    t = np.linspace(0, 40, 600)
+
+    def slope(t, x):
+        return [x[1], np.interp(t, (0, 40), (1, last)) * (1 - x[0] ** 2) * x[1] - x[0]]
+
+    x = solve_ivp(slope, (0, 40), (2, 0), t_eval=t, rtol=1e-8).y.T
+    found = discover(t, add_noise(x, 0.05, np.random.default_rng(1)), order=1)
+    assert differing(found) == told
 
 
 @pytest.mark.parametrize("place", [0.007, 0.0])

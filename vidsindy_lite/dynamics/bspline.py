@@ -173,8 +173,8 @@ class Grid:
         Control points to the curve at the samples: ``G``.
     nodes, slopes : sparse array, shape (k, r)
         The same for the curve and its slope at the collocation nodes.
-    node_weights : ndarray, shape (k,)
-        Share of each node in the physics loss; they sum to n.
+    node_times, node_weights : ndarray, shape (k,)
+        When each node is, and its share in the physics loss; the shares sum to n.
     """
 
     segments: tuple[Segment, ...]
@@ -184,6 +184,7 @@ class Grid:
     samples: sparse.csr_array
     nodes: sparse.csr_array
     slopes: sparse.csr_array
+    node_times: Floats
     node_weights: Floats
 
     @classmethod
@@ -203,6 +204,7 @@ class Grid:
             samples=basis(knots, starts, [segment.t for segment in segments]),
             nodes=basis(knots, starts, nodes),
             slopes=basis(knots, starts, nodes, order=1),
+            node_times=np.concatenate(nodes),
             node_weights=width / width.sum() * len(x),
         )
 
@@ -213,8 +215,15 @@ class Grid:
             self,
             nodes=basis(self.knots, self.starts, times),
             slopes=basis(self.knots, self.starts, times, order=1),
+            node_times=np.concatenate(times),
             node_weights=np.full(count, len(self.x) / count),
         )
+
+    @property
+    def runs(self) -> Ints:
+        """The trajectory to which each node belongs, (k,)."""
+        segments = np.searchsorted(self.starts, self.nodes.indices[::WIDTH], side="right") - 1
+        return np.array([segment.trajectory for segment in self.segments])[segments]
 
     @property
     def r(self) -> int:

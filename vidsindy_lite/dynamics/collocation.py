@@ -357,7 +357,9 @@ class Collocation:
         squares = self.grid.node_weights @ self._missed(state, x, slope) ** 2
         return self.data_loss(curve) + float(squares @ self.physics_weights)
 
-    def linearise(self, state: State, columns: Ints, damping: float = 0.0) -> WithCurve:
+    def linearise(
+        self, state: State, columns: Ints, damping: float = 0.0, parts: Sequence[Bools] = ()
+    ) -> WithCurve:
         """Linearise around a state and eliminate the control points.
 
         Parameters
@@ -368,6 +370,8 @@ class Collocation:
             Entries of `State.flat` to keep as unknowns, active or not.
         damping : float
             Relative Levenberg-Marquardt damping of the control points.
+        parts : sequence of ndarray of bool, shape (k,)
+            Nodes at which all columns once more are unknowns of their own, after the others.
 
         Raises
         ------
@@ -376,6 +380,12 @@ class Collocation:
         """
         curve, x, slope = self.grid.along(state.control_points)
         physics, unknowns = self._derivatives(state, columns, x, slope)
+        if parts:
+            left, rates, rest = np.split(unknowns, [1, 1 + len(columns)], axis=1)
+            own = [rates * part.repeat(self.d)[:, None] for part in parts]
+            unknowns = np.hstack([left, rates, *own, rest])
+            size = len(state.sources)
+            columns = np.concatenate([columns + k * size for k in range(1 + len(parts))])
         data_residual, sizes = self._left(curve)
         factor = self._factor(physics, damping)
 

@@ -331,6 +331,15 @@ def _distance(residual: Floats, noise: float) -> tuple[float, float]:
 # noise hides what it leaves, a law with one of them may fit as well.
 
 
+def more_than_chance(gain: float, count: int) -> bool:
+    """Whether so many further unknowns explain more than chance makes them, in chi-square units.
+
+    Half more, where errors are all but independent, such as those of tracks in compressed video
+    (1.2 was seen).
+    """
+    return bool(count and gain > 1.5 * chdtri(count, 1e-4))
+
+
 @dataclass(frozen=True)
 class Beyond:
     """What terms of higher degree would explain, and the best of those that a law has not.
@@ -360,13 +369,9 @@ class Beyond:
 
     @property
     def significant(self) -> bool:
-        """Whether that is more than chance makes.
-
-        Half more, where errors are all but independent, such as those of tracks in compressed video
-        (1.2 was seen).
-        """
-        several = self.gain > 1.5 * chdtri(self.count, 1e-4)
-        return bool(self.count and (several or chdtrc(1, self.best) * self.tried < 1e-3))
+        """Whether that is more than chance makes."""
+        several = more_than_chance(self.gain, self.count)
+        return bool(several or self.count and chdtrc(1, self.best) * self.tried < 1e-3)
 
     @property
     def decisive(self) -> bool:
@@ -801,9 +806,10 @@ def _rivals(
     problem: Problem, fit: Fit, model: Linearisation, wider: Wider, path: Path,
     law: PolynomialSystem, remedy: str, clean: bool,
 ) -> Iterator[str]:  # fmt: skip
-    """Do other terms or another origin explain the data as well?"""
+    """Do other terms, coefficients that change or another origin explain the data as well?"""
     if clean and not problem.has_process_noise:
         return  # what is left is the error of the splines, not noise: it settles nothing
+    yield from _changing(problem, fit, path.tolerated)
     tolerant = clean or max(p.low for p in path.of(fit.state.active)) > path.lowest
     found = wider.beyond
     # Errors that last may follow the state, too; they are no reason to doubt, unless a single term,
@@ -820,6 +826,37 @@ def _rivals(
         yield from _far_neighbours(wider, remedy)
         origins += elsewhere(problem.cautious, fit, law)
     yield from untold_origins(origins, remedy)
+
+
+def _changing(problem: Problem, fit: Fit, tolerated: float) -> Iterator[str]:
+    """Has the law other coefficients in a part of the data: a run, the second half, before jumps?
+
+    Chow's test of their constancy (1960), by its score: what they would explain if they were free
+    in that part, at the errors that are tolerated.
+    """
+    grid, own = fit.collocation.grid, np.flatnonzero(fit.state.free())
+    runs = np.unique(grid.runs)
+    parts = {f"run {run}": grid.runs == run for run in runs.tolist()}
+    if len(runs) == 1:
+        parts = {"the second half of the data": np.arange(len(grid.runs)) >= len(grid.runs) / 2}
+    step, before = typical_step(problem.trajectories), np.zeros(len(grid.runs), dtype=bool)
+    for run, jumps in enumerate(problem.jumps):
+        early = jumps - grid.node_times[:, None]
+        before |= (grid.runs == run) & ((early > 0) & (early < step)).any(axis=1)
+    if before.any():
+        parts["the sample before a jump of an input"] = before
+    model = fit.collocation.linearise(fit.state, own, parts=list(parts.values()))
+    size = len(fit.state.flat())
+    gains = [
+        (model.of(np.append(own, own + (1 + k) * size)).newton()[1] - model.fall) / tolerated**2
+        for k in range(len(parts))
+    ]
+    gain, where = max(zip(gains, parts, strict=True))
+    if more_than_chance(gain, len(own)):
+        yield (
+            f"{where} has other coefficients than the rest (chi-square {gain:.4g} of {len(own)}): "
+            "something that is not in the law differs or changes"
+        )
 
 
 def _far_neighbours(wider: Wider, remedy: str, odds_allowed: float = 0.02) -> Iterator[str]:
