@@ -859,7 +859,7 @@ def _changing(problem: Problem, fit: Fit, tolerated: float) -> Iterator[str]:
         )
 
 
-def _far_neighbours(wider: Wider, remedy: str, odds_allowed: float = 0.02) -> Iterator[str]:
+def _far_neighbours(wider: Wider, remedy: str, odds_allowed: float = 0.05) -> Iterator[str]:
     """Has another law that may as well be true coefficients far from those of this one?
 
     The axes stay as they are: the same law in another frame would count.
