@@ -862,7 +862,8 @@ def _changing(problem: Problem, fit: Fit, tolerated: float) -> Iterator[str]:
 def _far_neighbours(wider: Wider, remedy: str, odds_allowed: float = 0.05) -> Iterator[str]:
     """Has another law that may as well be true coefficients far from those of this one?
 
-    The axes stay as they are: the same law in another frame would count.
+    Unless the odds against it are 20 to 1 (strong evidence, as in `pinned`). The axes stay as they
+    are: the same law in another frame would count.
     """
     law, columns = wider.problem.law(wider.fit.state), wider.problem.form.searched
     support, present = wider.fit.state.free()[columns], wider.fit.state.flat()[columns]
