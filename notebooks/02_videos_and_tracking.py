@@ -150,8 +150,9 @@ save_table("videos_frame_rate", rows, caption="Frames per period, if taken liter
 
 # %%
 fast = SYSTEMS["Tsucs2"]
-t, x = fast.trajectory(24_000, samples_per_period=1000)
-t, x = t[20_000:], x[20_000:, 0]  # four periods, after the first swing
+swing = 20_000 if profile == "full" else 4_000
+t, x = fast.trajectory(swing + 4_000, samples_per_period=1000)
+t, x = t[swing:], x[swing:, 0]  # four periods, after the first swing
 samples = {
     f"{round(rate, 1):g} frames per period: {name}": (
         t[:: round(1000 / rate)],
@@ -465,6 +466,8 @@ cases = {
     "drifting, in changing light": ("sea", drift, light),
     "trembling, in changing light": ("bricks", tremble, light),
 }
+if profile == "quick":
+    del cases["a trembling camera"]
 
 # %%
 found, last = {}, []
@@ -499,7 +502,7 @@ for row in rows[1:]:
     assert row["learned: rms error (px)"] < 1
     assert row["learned: within 1 px (%)"] > 90
     assert row["auto: within 1 px (%)"] > seen
-for row in (rows[1], rows[3]):  # where the camera trembles
+for row in (row for row in rows if "trembling" in row["videos"]):
     assert row["background: within 1 px (%)"] < 60
 assert rows[0]["auto"] == "background"
 assert all(row["auto: rms error (px)"] < row["learned: rms error (px)"] for row in rows)

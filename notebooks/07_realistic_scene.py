@@ -100,7 +100,7 @@ for name, value in DISTURBANCES.items():
 
 # %%
 truth = replace(SYSTEMS["SprottF"], x0=START).shift(REFERENCE_OFFSET)
-t, x = truth.trajectory(250)
+t, x = truth.trajectory(250 if full else 160)
 rig = Rig.around(x)
 with TemporaryDirectory() as folder:
     paths = [Path(folder) / f"{number}.mov" for number in (1, 2, 3)]

@@ -76,7 +76,7 @@ from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, plots, score
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
 names = ("Lorenz", "SprottE") if full else ("Lorenz",)
-frames = 1000 if full else 220
+frames = 1000 if full else 160
 late, fps = 7, 30
 
 
@@ -555,7 +555,7 @@ def shoot_both(name, both):
 # %%
 rows, seen = [], {}
 for name, (law, x0, step, asked) in pair.items():
-    t = step * np.arange(600 if name == "Lorenz" else 300 if full else 200)
+    t = step * np.arange(600 if name == "Lorenz" else 300 if full else 150)
     x = law.simulate(t, x0)
     paths, rig = shoot_both(name, (x[:, :3], x[:, 3:6]))
     seen[name] = both = discover_from_videos(paths, rig, t, targets=2, **asked)

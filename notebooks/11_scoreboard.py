@@ -319,7 +319,7 @@ flows = (*four, "Roessler", "Arneodo", "Halvorsen", "Chen") if full else four[:1
 errors = (*ERRORS, *MOTIONS) if full else ("64 values", "drift 0.2 %", "kicks 1 %")
 few = flows[::4]  # of the slower methods
 tasks = [
-    FlowContest(flow, error, methods=CONTESTANTS[:5] if full and flow in few else both, seed=seed)
+    FlowContest(flow, error, 1500 if full else 500, methods=CONTESTANTS[:5] if full and flow in few else both, seed=seed)
     for error in errors
     for flow in flows
 ]

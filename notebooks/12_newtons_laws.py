@@ -355,7 +355,7 @@ assert "diverges" in outcome
 aside, down = np.array([0.6, 0.8, 0.0]), np.array([0.0, 0.0, -1.0])
 string = 1.0 * (np.sin(theta) * aside + np.cos(theta) * down)
 positions = string + 0.005 * rng.standard_normal(string.shape)
-seen_bob = discover(u, positions)
+seen_bob = discover(u, positions, degree=3 if full else 2)
 swing = seen_bob.swing
 print(swing)
 

@@ -4,12 +4,20 @@ import os
 import signal
 from collections import Counter
 from functools import cache
+from pathlib import Path
 
 # Before numpy is imported: results then do not depend on the number of cores.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 # Tests run side by side, one on each core.
 os.environ.setdefault("OPENCV_FOR_THREADS_NUM", "1")
+# Of the processes that tests start: the order of a set is then the same in every run.
+os.environ.setdefault("PYTHONHASHSEED", "0")
+# A second less for each that reads notebooks, see `disturbed/sitecustomize.py`.
+os.environ["PYTHONPATH"] = os.pathsep.join(
+    [str(Path(__file__).parent / "disturbed"), *filter(None, [os.environ.get("PYTHONPATH")])]
+)
 
+import disturbed.sitecustomize  # noqa: F401
 import pytest
 from helpers import TinyRepository
 from hypothesis import settings

@@ -1,15 +1,15 @@
 """Random curves, rigs and their tracks, a posed problem, and notebooks: tiny ones, quick runs."""
 
-import json
+import multiprocessing
 import os
-import subprocess
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 import numpy as np
 import pytest
+from disturbed.execute import HARNESS, execute
 from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
@@ -229,27 +229,29 @@ def one_a_frame(places, qualities):
                       np.full((n, 3), 100.0), np.asarray(qualities, float))  # fmt: skip
 
 
-HARNESS = Path(__file__).parent / "disturbed"
 SIZE = 1e-9  # of what disturbs tracks and trajectories, relatively
-
-
-def python(*arguments, cache, seed=None):
-    """Run Python with the harness at hand, which disturbs if a seed is given."""
-    paths = os.pathsep.join(map(str, (HARNESS, Path(vl.__file__).parents[1])))
-    settings = {"PYTHONPATH": paths, "VIDSINDY_CACHE": str(cache), "PYTHONHASHSEED": "0"}
-    if seed is not None:
-        settings["VIDSINDY_DISTURB"] = f"{SIZE}:{seed}"
-    return subprocess.run(
-        [sys.executable, *map(str, arguments)],
-        env=os.environ | settings, capture_output=True, text=True,
-    )  # fmt: skip
+# What notebooks load is there when one begins, but for the package, which may be disturbed.
+SERVER = multiprocessing.get_context("forkserver")
+SERVER.set_forkserver_preload(
+    ["IPython.display", "av", "cv2", "joblib", "pysindy", "scipy.stats", "seaborn", "torch"]
+)
 
 
 def run_quickly(path, figures, settings, cache, seed=None):
     """What a notebook fails with in its quick profile, with these settings; empty if it ends."""
-    asked = HARNESS / "execute.py", figures, path, json.dumps(settings)
-    ran = python(*asked, cache=cache, seed=seed)
-    return ran.stderr[-3000:] if ran.returncode else ""
+    paths = os.pathsep.join(map(str, (HARNESS, Path(vl.__file__).parents[1])))
+    variables = {
+        "PYTHONPATH": paths, "VIDSINDY_CACHE": str(cache), "VIDSINDY_FIGURES": str(figures),
+        "VIDSINDY_NOTEBOOK": path.stem,
+    }  # fmt: skip
+    if seed is not None:
+        variables["VIDSINDY_DISTURB"] = f"{SIZE}:{seed}"
+    with NamedTemporaryFile() as log:
+        process = SERVER.Process(target=execute, args=(path, settings, variables, log.name))
+        process.start()
+        process.join()
+        said = Path(log.name).read_text("utf-8")[-3000:]
+    return (said or f"ended with status {process.exitcode}") if process.exitcode else ""
 
 
 class TinyRepository:

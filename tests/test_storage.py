@@ -13,14 +13,7 @@ from helpers import full_disk
 import vidsindy_lite as vl
 from vidsindy_lite import storage
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.storage import (
-    DEEPEST,
-    PACKAGE,
-    RESULTLESS,
-    code_hash,
-    read_tree,
-    write_file,
-)
+from vidsindy_lite.storage import DEEPEST, PACKAGE, RESULTLESS, code_hash, read_tree, write_file
 from vidsindy_lite.vision import read_tracks
 
 ROOT = PACKAGE.parent

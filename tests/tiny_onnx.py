@@ -67,14 +67,9 @@ def write_red_detector(path, size, batch=1, rows=5):
         "boxes": boxes,
         "shape": np.array([1, 1, n]),
     }
+    square = [STRIDE] * 2
     nodes = [
-        _node(
-            "Conv",
-            ["images", "weight", "bias"],
-            "red",
-            strides=[STRIDE] * 2,
-            kernel_shape=[STRIDE] * 2,
-        ),
+        _node("Conv", ["images", "weight", "bias"], "red", strides=square, kernel_shape=square),
         _node("Sigmoid", ["red"], "sure"),
         _node("Reshape", ["sure", "shape"], "confidence"),
         _node("Concat", ["boxes", "confidence"], "output0", axis=1),

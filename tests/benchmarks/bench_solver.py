@@ -1,4 +1,4 @@
-"""The solver: time and memory, against the paper's optimiser, baselines and the Cramer-Rao bound.
+"""The solver: time and memory, against the paper's optimiser and the Cramer-Rao bound; the tracker.
 
 Run with `make bench` on an otherwise idle machine (about half an hour). Every bar is a ratio taken
 in one run, or a time of the processor.
@@ -19,6 +19,7 @@ from vidsindy_lite.study import (
     score,
     spline_ado,
 )
+from vidsindy_lite.vision import BACKGROUNDS, Scene, read_video, render_video, track
 
 
 def note(benchmark, case, value, unit, bar=""):
@@ -116,3 +117,22 @@ def test_accuracy_against_the_cramer_rao_bound(noise):
     note("Cramer-Rao", f"noise {noise:.0%}", np.concatenate(covered).size, "draws", "200")
     assert ratio <= 1.5
     assert 90 <= coverage <= 99
+
+
+@pytest.mark.parametrize("background", BACKGROUNDS)
+def test_tracking_takes_at_most_twice_as_long_as_decoding_and_keeps_all_frames(
+    tmp_path, background
+):
+    """A Lorenz orbit, projected along a random direction into the image."""
+    plane, _ = np.linalg.qr(np.random.default_rng(100).normal(size=(3, 2)))
+    truth = SYSTEMS["Lorenz"].trajectory(1500)[1] @ plane
+    truth = 40 + (truth - truth.min(axis=0)) / np.ptp(truth, axis=0) * (512 - 1 - 2 * 40)
+    path = render_video(tmp_path / "clip.mkv", truth, Scene(background), seed=100)
+    decoding = min(seconds(lambda: sum(1 for _ in read_video(path)))[0] for _ in range(3))
+    tracking, found = min((seconds(track, path) for _ in range(3)), key=lambda one: one[0])
+    error = np.linalg.norm(found.pixels - truth, axis=1)
+    note("tracking", background, np.sqrt(np.mean(error**2)), "px rms", "0.1")
+    note("tracking", background, tracking / decoding, "of decoding", "2")
+    assert np.isfinite(error).all()
+    assert np.sqrt(np.mean(error**2)) <= 0.1
+    assert tracking <= 2 * decoding

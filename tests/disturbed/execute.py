@@ -1,30 +1,33 @@
 """Execute a notebook as plain Python, in its quick profile or with other settings, on no paper.
 
-    python tests/disturbed/execute.py FIGURES notebooks/03_camera_learning.py '{"seed": 1}'
-
-Its figures are laid out and drawn, see `undisplayed.py`, its tables go to FIGURES, as from a run
-through papermill, in a part of its time. Sweeps work in this very process: the cores are busy.
+Its figures are laid out and drawn, see `undisplayed.py`, its tables go to VIDSINDY_FIGURES, as from
+a run through papermill, in a part of its time. Sweeps work in this very process: the cores are
+busy.
 """
 
-import json
+import importlib
 import os
 import re
 import sys
 from pathlib import Path
 
-import matplotlib as mpl
+HARNESS = Path(__file__).parent
 
-if __name__ == "__main__":
-    figures, notebook = (Path(argument).resolve() for argument in sys.argv[1:3])
-    settings = {"profile": "quick", "jobs": 1} | json.loads((*sys.argv, "{}")[3])
+
+def execute(notebook, settings, variables, log):
+    """Do so in a new process, with more environment variables; what goes wrong stands in a log."""
+    for stream, path in ((1, os.devnull), (2, log)):
+        os.dup2(os.open(path, os.O_WRONLY), stream)
     source = notebook.read_text("utf-8")
-    for name, value in settings.items():
+    for name, value in ({"profile": "quick", "jobs": 1} | settings).items():
         source, there = re.subn(
             rf"^({name}: \w+ = ).*?(?=  #)", rf"\g<1>{value!r}", source, count=1, flags=re.MULTILINE
         )
         if not there and name != "jobs":
             sys.exit(f"{name}: must be a parameter of {notebook.stem}")
-    os.environ |= {"VIDSINDY_FIGURES": str(figures), "VIDSINDY_NOTEBOOK": notebook.stem}
+    os.environ |= variables
     os.chdir(notebook.parent)
-    mpl.use("module://undisplayed")
+    sys.path.insert(0, str(HARNESS))
+    importlib.import_module("disturbed.sitecustomize")  # before the package
+    importlib.import_module("matplotlib").use("module://undisplayed")
     exec(compile(source, str(notebook), "exec"), {"__name__": notebook.stem})

@@ -66,6 +66,8 @@ class Disturb(MetaPathFinder):
         return spec
 
 
+# Of no use where the format of no address is checked, and takes a second to import.
+sys.modules["rfc3987_syntax"] = None
 if setting := os.environ.get("VIDSINDY_DISTURB"):
     size, _, seed = setting.partition(":")
     sys.meta_path.insert(0, Disturb(float(size), int(seed)))

@@ -17,7 +17,8 @@ def test_every_claim_has_a_check(page):
     assert len(claims_of(page)) >= 3
 
 
-CELLS = """\
+CHECKS = "one + one == 2; figure sum; docs/page.md; 02: two > 1"
+CELLS = f"""\
 # %% [markdown]
 # # One
 #
@@ -27,7 +28,7 @@ CELLS = """\
 #
 # * One and one
 #   are two ([02](02_two.ipynb)).
-#   <!-- by: one + one == 2; figure sum; docs/page.md; 02: two > 1 -->
+#   <!-- by: {CHECKS} -->
 #
 # **What the paper says and what we found.** Nothing.
 # <!-- by: tests/test_sum.py::test_one -->
@@ -75,18 +76,14 @@ def test_a_claim_is_listed_with_its_checks(page):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (
-            "#   <!-- by: one + one == 2; figure sum; docs/page.md; 02: two > 1 -->\n",
-            "",
-            "no check",
-        ),
+        (f"#   <!-- by: {CHECKS} -->\n", "", "no check"),
         ("by: one + one == 2", "by: one + one == 3", "no assertion"),
         ("    one + one == 2\n", "    one + one == 3\n", "no assertion"),
         ("figure sum", "figure product", "no assertion"),
         ("docs/page.md", "docs/other.md", "no assertion"),
         ("02: two > 1", "02: two > 2", "no assertion"),
         ("::test_one", "::test_two", "no assertion"),
-        ("one + one == 2; figure sum; docs/page.md; 02: two > 1", "figure sum", "nothing could"),
+        (CHECKS, "figure sum", "nothing could"),
     ],
 )
 def test_a_claim_without_a_check_is_seen(page, old, new, message):

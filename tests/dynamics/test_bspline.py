@@ -9,13 +9,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline, make_smoothing_spline
 from scipy.optimize import approx_fprime
 
-from vidsindy_lite.dynamics.bspline import (
-    PENALTIES,
-    Segment,
-    clamped_knots,
-    design_matrix,
-    smooth,
-)
+from vidsindy_lite.dynamics.bspline import PENALTIES, Segment, clamped_knots, design_matrix, smooth
 from vidsindy_lite.dynamics.collocation import Collocation, State, Status
 from vidsindy_lite.dynamics.inference import _pruned
 from vidsindy_lite.dynamics.l0 import closest_rival, inverse, subset_search

@@ -5,11 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vidsindy_lite.dynamics.data import (
-    check_trajectories,
-    check_trajectory,
-    variable_names,
-)
+from vidsindy_lite.dynamics.data import check_trajectories, check_trajectory, variable_names
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.model import PolynomialSystem, integrate, runge_kutta_4
 
