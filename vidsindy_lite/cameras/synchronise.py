@@ -40,10 +40,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from tqdm import tqdm
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..progress import bar
 from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, known_to
-from .calibrate import check_learnable, closed_form, learn_cameras
+from .calibrate import check_learnable, closed_form
 from .clocks import (
     INSTANTS,
     OVERLAP,
@@ -72,10 +72,12 @@ RATES = ((25, 30), (30, 25), (24, 30), (30, 24), (24, 25), (25, 24), (30, 60), (
 """Rates over those stated that are taken for each other."""
 _INSTANTS = 60  # at which two views are compared
 _MISTAKES = 16  # of a kind that mend most, tried with all cameras
-_PART = 0.4  # of the videos, in which their cameras are learned if frames were dropped elsewhere
+_PART, _PARTS = 0.4, (0.0, 0.3, 0.6)  # of the videos, in which their cameras are learned if frames
+# were dropped elsewhere: how long they are, and where they begin
+_ROUNDS = 3
 _FRAMES = 1500  # of the first video at which a jump of the lag is sought
 _LONGEST = 60  # frames by which it may jump
-_MOST, _PRICE = 8.0, 40.0  # typical misses: the most that one frame counts, and the price of a jump
+_PRICE = 20.0  # of a jump
 _MANY = 6  # cameras, of which only two are taken for each other
 _ROUNDING = 1e-9  # scene units, or a share of a slope that is motion
 
@@ -523,11 +525,15 @@ class Mistake:
         behind = np.insert(lags, first_known(cameras), 0.0)
         return float(np.linalg.norm(least)), behind - behind[0]
 
-    def left(self, rig: Rig, lags: Floats) -> float:
-        """Pixels by which the worst view disagrees near these lags."""
+    def fits(self, rig: Rig, *lags: Floats) -> list[Adjustment]:
+        """Cameras and lags near these, roughly."""
         videos = _Videos.of(self.tracks, rig, self.rates, self.clocks)
-        found = videos.fitted(lags, rough=True)
-        return np.inf if found is None else found.left()
+        found = [videos.fitted(each, rough=True) for each in np.unique(lags, axis=0)]
+        return [fit for fit in found if fit]
+
+    def near(self, rig: Rig, start: Floats) -> list[Adjustment]:
+        """Near given lags and the best of two views, which are as rough as the rig."""
+        return self.fits(rig, start, self.paired(rig.cameras)[1])
 
 
 def find_mistake(
@@ -549,35 +555,29 @@ def find_mistake(
     """
     none = Mistake("", tuple(tracks), rates, check_clocks(clocks, tracks))
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
-        if none.left(rig, start) <= 2 * DISAGREEMENT:
-            return None
-        left = none.left(rig, none.paired(rig.cameras)[1])
+        left = min((fit.left() for fit in none.near(rig, start)), default=np.inf)
         if left <= 2 * DISAGREEMENT:
             return None
         found: list[Mistake] = []
-        for kind in (_views, _rates, partial(_dropped, start=start)):
+        for kind in (partial(_dropped, start=start), _views, _rates):
             if found and found[-1].lags.residual <= DISAGREEMENT:
                 break
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
             # none.
             each = {one.what: one for one in kind(none, rig, names)}.values()
-            ranked = [(*one.paired(rig.cameras), one) for one in each]
-            ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
-            # Where a rig is rough, so are the best lags of two views: those that are given count.
-            tried = [
-                (one.left(rig, lags), lags, one)
-                for _, best, one in ranked
-                for lags in np.unique([start, best], axis=0)
-            ]
-            for now, best, one in sorted(tried, key=lambda one: one[0]):
+            ranked = sorted(each, key=lambda one: one.paired(rig.cameras)[0])[:_MISTAKES]
+            tried = [(fit.left(), fit, one) for one in ranked for fit in one.near(rig, start)]
+            for now, fit, one in sorted(tried, key=lambda one: one[0]):
                 # Times by which it has to mend the disagreement of all views together.
-                if 3.0 * now < left:
-                    told = learn_lags(one.tracks, rig, one.rates, best, one.clocks)
-                    if told.agree and told.residual <= 2 * DISAGREEMENT:
-                        others = [o.what for n, _, o in tried if n <= ALIKE * max(now, FINE)]
-                        alike = tuple(dict.fromkeys(o for o in others if o != one.what))
-                        found.append(replace(one, lags=told, before=left, alike=alike))
-                        break
+                if now > GROSS or 3.0 * now >= left:
+                    break
+                lags = fit.footage.lags
+                told = learn_lags(one.tracks, rig, one.rates, lags, one.clocks)
+                if told.agree and told.residual <= 2 * DISAGREEMENT:
+                    others = [o.what for n, _, o in tried if n <= ALIKE * max(now, FINE)]
+                    alike = tuple(dict.fromkeys(o for o in others if o != one.what))
+                    found.append(replace(one, lags=told, before=left, alike=alike))
+                    break
         return min(found, key=lambda one: one.lags.residual, default=None)
     return None
 
@@ -632,78 +632,99 @@ def _rates(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
 
 
 def _dropped(none: Mistake, rig: Rig, names: Sequence[str], start: Floats) -> Iterator[Mistake]:
-    """Videos of which frames were dropped, each with the clock by which it agrees all the time."""
-    length = min(clock[-1] / rate for clock, rate in zip(none.clocks, none.rates, strict=True))
-    curves = tuple(map(Curve, none.tracks, none.clocks))
-    for low, high in ((0.0, _PART), (1 - _PART, 1.0)):  # in one of them none is dropped, maybe
-        ends = length * np.outer(none.rates, [low, high])
-        rows = [(e[0] <= c) & (c <= e[1]) for c, e in zip(none.clocks, ends, strict=True)]
-        tracks = tuple(t[part] for t, part in zip(none.tracks, rows, strict=True))
-        clocks = tuple(c[r] - e[0] for c, r, e in zip(none.clocks, rows, ends, strict=True))
-        try:
-            best = learn_lags(tracks, rig, none.rates, start, clocks)
-            views = align(tracks, best.frames, none.rates, clocks)
-            cameras = learn_cameras(views, rig).cameras
-        except ValueError:
-            continue
-        if not best.agree:
-            continue
-        jumps = [_jumps(curves, none.rates, cameras, best.frames, j) for j in range(1, len(names))]
-        if all(found and found[0][2] < 0 for found in jumps):  # it is the first that lacks some
-            each = {0: [(frame, -jump) for frame, _, jump in jumps[0]]}
-        else:
-            each = {j: [found[1:] for found in jumps[j - 1]] for j in range(1, len(names))}
-        mended, told = list(none.clocks), []
-        for j, found in each.items():
-            mended[j] = clock = mended[j].copy()
-            lacking: dict[int, int] = {}
-            for place, jump in found:
-                row = int(np.clip(np.rint(place), 0, len(clock) - 1))
-                lacking[row] = lacking.get(row, 0) + round(jump * none.rates[j])
-            for row, count in lacking.items():
-                clock[row:] += count
-                if count:
-                    told.append(f"{count} frames dropped of {names[j]} before its frame {row}")
-        if told and all((np.diff(clock) > 0).all() for clock in mended):
-            yield replace(none, what=", ".join(told), clocks=tuple(mended))
+    """Videos of which frames were dropped, with the clocks by which they agree all the time."""
+    length, ways = Footage.of(none.tracks, None, none.rates, none.clocks).lengths.min(), []
+    for low in _PARTS:  # in one of them none is dropped, maybe: its cameras tell when
+        begins, ends = length * np.outer([low, low + _PART], none.rates)
+        rows = [(b <= c) & (c <= e) for b, c, e in zip(begins, none.clocks, ends, strict=True)]
+        tracks, clocks = (
+            [x[r] for x, r in zip(each, rows, strict=True)] for each in (none.tracks, none.clocks)
+        )
+        part = replace(none, tracks=tuple(tracks), clocks=tuple(c - c[0] for c in clocks))
+        ways += [_jumped(none, fit) for fit in part.near(rig, start)]
+    for _ in range(_ROUNDS):
+        if not ways:
+            return
+        _, lags, found = min(ways, key=lambda way: way[0])
+        lags, found = _counted(none, found, rig, lags)
+        ways = [_jumped(found, fit) for fit in found.fits(rig, lags)]
+    told = []
+    for name, before, after in zip(names, none.clocks, found.clocks, strict=True):
+        lacking = np.diff(after - before)
+        told += [
+            f"{lacking[k]:.0f} frames dropped of {name} before its frame {k + 1}"
+            for k in np.flatnonzero(lacking)
+        ]
+    if told:
+        yield replace(found, what=", ".join(told))
 
 
-def _jumps(
-    curves: Sequence[Curve], rates: Floats, cameras: Sequence[Camera], lags: Floats, j: int
-) -> list[tuple[float, float, float]]:
-    """Frames of the first video and of another where its lag behind the first jumps; by how much.
+def _counted(none: Mistake, found: Mistake, rig: Rig, lags: Floats) -> tuple[Floats, Mistake]:
+    """As many frames dropped as fit best, if each part of a video has a lag of its own."""
+    late = [after - before for after, before in zip(found.clocks, none.clocks, strict=True)]
+    parts = [(i, one == value) for i, one in enumerate(late) for value in np.unique(one)]
+    whose = [i for i, _ in parts]
+    shown = [np.where(rows[:, None], found.tracks[i], np.nan) for i, rows in parts]
+    cameras = Rig([rig.cameras[i] for i in whose])
+    videos = _Videos.of(shown, cameras, found.rates[whose], [found.clocks[i] for i in whose])
+    fit = videos.fitted(lags[whose], rough=True)
+    if fit is None:
+        return lags, found
+    first = fit.footage.lags[[whose.index(i) for i in range(len(late))]]
+    clocks = [clock.copy() for clock in found.clocks]
+    for (i, rows), lag in zip(parts, fit.footage.lags, strict=True):
+        clocks[i][rows] += np.rint((lag - first[i]) * found.rates[i])
+    if not all((np.diff(clock) > 0).all() for clock in clocks):
+        return lags, found
+    return first, replace(found, clocks=tuple(clocks))
+
+
+def _jumped(given: Mistake, fit: Adjustment) -> tuple[float, Floats, Mistake]:
+    """With the clock of one video set forward at some frames; what is missed, and its lags.
 
     The lags that leave the least, each jump at a price, by dynamic programming.
     """
-    stride = -(-len(curves[0].clock) // _FRAMES)
-    frames = curves[0].clock[::stride]
-    tried = lags[j] - lags[0] + np.arange(-_LONGEST, _LONGEST + 1)
-    lines = epipolar_lines(cameras[0], curves[0].at(frames), cameras[j])
-    theirs = curves[j].at((frames - tried[:, None]) * rates[j])
-    design, target = epipolar_rows(lines, cameras[j], theirs)
-    missed = np.abs(target - design @ cameras[j].scaled_turn)
-    usual = missed[_LONGEST][np.isfinite(missed[_LONGEST])]
-    if not usual.size:
-        return []
-    typical = max(float(np.quantile(usual, _PART / 2)), _ROUNDING)
-    # What nobody saw costs as much as what was seen: no lag is better for leaving frames out.
-    cost = np.minimum(missed / typical, _MOST)
-    cost = np.nan_to_num(cost, nan=float(np.minimum(usual / typical, _MOST).mean()))
-    # Both clocks go on: a lag that grows passes frames of the first video which the other lacks.
-    jumps = tried[:, None] - tried
-    passed = np.maximum(np.ceil(jumps / stride), 1).astype(int)
-    price = np.where(jumps == 0, 0.0, _PRICE + cost.mean(axis=1).min() * (passed - 1))
-    total, came = np.full(cost.T.shape, np.inf), np.zeros(cost.T.shape, dtype=int)
-    total[0], every = cost[:, 0], np.arange(len(tried))
-    for k in range(1, len(frames)):
-        ways = price + np.where(passed <= k, total[np.maximum(k - passed, 0), every], np.inf)
-        came[k] = ways.argmin(axis=1)
-        total[k] = ways[every, came[k]] + cost[:, k]
-    k, now, found = len(frames) - 1, int(total[-1].argmin()), []
-    while k > 0:
-        then = int(came[k, now])
-        if then != now:
-            place = (frames[k] - tried[now]) * rates[j]
-            found.append((float(frames[k]), float(place), float(jumps[now, then])))
-        k, now = k - int(passed[now, then]), then
-    return found[::-1]
+    lags, rates, late = fit.footage.lags, given.rates, np.arange(-_LONGEST, _LONGEST + 1)
+    curves, ways = tuple(map(Curve, given.tracks, given.clocks)), []
+    for i, (camera, curve) in enumerate(zip(fit.cameras, curves, strict=True)):
+        stride = -(-len(curve.clock) // _FRAMES)
+        clock, track = curve.clock[::stride], curve.track[::stride]
+        instants = (clock + late[:, None]) / rates[i] + lags[i]
+        missed = np.full((len(curves), *instants.shape), np.nan)
+        for j, other in enumerate(fit.cameras):
+            if j != i:
+                lines = epipolar_lines(camera, track, other)
+                theirs = curves[j].at((instants - lags[j]) * rates[j])
+                design, target = epipolar_rows(lines, other, theirs)
+                missed[j] = (target - design @ other.scaled_turn) / other.calibration[0]
+        seen, costs = np.isfinite(missed), np.log1p((missed / DISAGREEMENT) ** 2)
+        cost = np.nansum(costs, axis=0) / np.maximum(seen.sum(axis=0), 1)
+        # What nobody saw costs as much as what was seen: no lag is better for leaving frames out.
+        cost[~seen.any(axis=0)] = np.nanmean(costs) if seen.any() else 0.0
+        slack = np.diff(clock, prepend=clock[0]) - stride  # by which a clock may be set back
+        least, path = _cheapest(cost.T, np.maximum(slack, 0).astype(int))
+        later = np.repeat(late[path], stride)[: len(curve.clock)]
+        ahead = np.where(np.arange(len(curves)) == i, later[0] / rates[i], 0.0) + lags
+        clocks = tuple(one.clock + (later - later[0] if one is curve else 0.0) for one in curves)
+        ways.append((least / len(clock), ahead - ahead[0], replace(given, clocks=clocks)))
+    return min(ways, key=lambda way: way[0])
+
+
+def _cheapest(costs: Floats, slack: Ints) -> tuple[float, Ints]:
+    """The cheapest way through states of such costs, (n, k), each change of the state at a price.
+
+    A state is followed by one of at least its own number less the slack, (n,).
+    """
+    states, total = np.arange(costs.shape[1]), costs[0]
+    came = np.zeros(costs.shape, dtype=int)
+    for k, cost in enumerate(costs[1:], 1):
+        least = np.minimum.accumulate(total)
+        lowest = np.maximum.accumulate(np.where(total == least, states, 0))
+        came[k] = lowest[np.minimum(states + slack[k], states[-1])]
+        stay = total <= total[came[k]] + _PRICE
+        came[k][stay] = states[stay]
+        total = total[came[k]] + np.where(stay, 0.0, _PRICE) + cost
+    path = [int(total.argmin())]
+    for before in came[:0:-1]:
+        path.append(int(before[path[-1]]))
+    return float(total.min()), np.array(path[::-1])
