@@ -646,7 +646,6 @@ def _dropped(none: Mistake, rig: Rig, names: Sequence[str], start: Floats) -> It
         if not ways:
             return
         _, lags, found = min(ways, key=lambda way: way[0])
-        lags, found = _counted(none, found, rig, lags)
         ways = [_jumped(found, fit) for fit in found.fits(rig, lags)]
     told = []
     for name, before, after in zip(names, none.clocks, found.clocks, strict=True):
@@ -659,33 +658,13 @@ def _dropped(none: Mistake, rig: Rig, names: Sequence[str], start: Floats) -> It
         yield replace(found, what=", ".join(told))
 
 
-def _counted(none: Mistake, found: Mistake, rig: Rig, lags: Floats) -> tuple[Floats, Mistake]:
-    """As many frames dropped as fit best, if each part of a video has a lag of its own."""
-    late = [after - before for after, before in zip(found.clocks, none.clocks, strict=True)]
-    parts = [(i, one == value) for i, one in enumerate(late) for value in np.unique(one)]
-    whose = [i for i, _ in parts]
-    shown = [np.where(rows[:, None], found.tracks[i], np.nan) for i, rows in parts]
-    cameras = Rig([rig.cameras[i] for i in whose])
-    videos = _Videos.of(shown, cameras, found.rates[whose], [found.clocks[i] for i in whose])
-    fit = videos.fitted(lags[whose], rough=True)
-    if fit is None:
-        return lags, found
-    first = fit.footage.lags[[whose.index(i) for i in range(len(late))]]
-    clocks = [clock.copy() for clock in found.clocks]
-    for (i, rows), lag in zip(parts, fit.footage.lags, strict=True):
-        clocks[i][rows] += np.rint((lag - first[i]) * found.rates[i])
-    if not all((np.diff(clock) > 0).all() for clock in clocks):
-        return lags, found
-    return first, replace(found, clocks=tuple(clocks))
-
-
 def _jumped(given: Mistake, fit: Adjustment) -> tuple[float, Floats, Mistake]:
     """With the clock of one video set forward at some frames; what is missed, and its lags.
 
     The lags that leave the least, each jump at a price, by dynamic programming.
     """
     lags, rates, late = fit.footage.lags, given.rates, np.arange(-_LONGEST, _LONGEST + 1)
-    curves, ways = tuple(map(Curve, given.tracks, given.clocks)), []
+    curves, before, ways = tuple(map(Curve, given.tracks, given.clocks)), 0.0, []
     for i, (camera, curve) in enumerate(zip(fit.cameras, curves, strict=True)):
         stride = -(-len(curve.clock) // _FRAMES)
         clock, track = curve.clock[::stride], curve.track[::stride]
@@ -706,8 +685,12 @@ def _jumped(given: Mistake, fit: Adjustment) -> tuple[float, Floats, Mistake]:
         later = np.repeat(late[path], stride)[: len(curve.clock)]
         ahead = np.where(np.arange(len(curves)) == i, later[0] / rates[i], 0.0) + lags
         clocks = tuple(one.clock + (later - later[0] if one is curve else 0.0) for one in curves)
-        ways.append((least / len(clock), ahead - ahead[0], replace(given, clocks=clocks)))
-    return min(ways, key=lambda way: way[0])
+        as_it_was = cost[_LONGEST].mean()
+        before += as_it_was / 2  # as each pair of views counts twice
+        gain = as_it_was - least / len(clock)
+        ways.append((gain, ahead - ahead[0], replace(given, clocks=clocks)))
+    gain, lags, mended = max(ways, key=lambda way: way[0])
+    return before - gain, lags, mended
 
 
 def _cheapest(costs: Floats, slack: Ints) -> tuple[float, Ints]:
