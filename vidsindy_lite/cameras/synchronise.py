@@ -75,6 +75,7 @@ _MISTAKES = 16  # of a kind that mend most, tried with all cameras
 _PART, _PARTS = 0.4, (0.0, 0.3, 0.6)  # of the videos, in which their cameras are learned if frames
 # were dropped elsewhere: how long they are, and where they begin
 _ROUNDS = 3
+_STRETCHES = 20  # of a video, of which the worst tells whether frames were dropped
 _FRAMES = 1500  # of the first video at which a jump of the lag is sought
 _LONGEST = 60  # frames by which it may jump
 _PRICE = 20.0  # of a jump
@@ -555,18 +556,21 @@ def find_mistake(
     """
     none = Mistake("", tuple(tracks), rates, check_clocks(clocks, tracks))
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
-        left = min((fit.left() for fit in none.near(rig, start)), default=np.inf)
+        begun = none.near(rig, start)
+        left = min(map(_worst, begun), default=np.inf)
         if left <= 2 * DISAGREEMENT:
             return None
         found: list[Mistake] = []
-        for kind in (partial(_dropped, start=start), _views, _rates):
+        # Whole views are not mistaken where most frames agree.
+        most = min((fit.left() for fit in begun), default=np.inf) <= 2 * DISAGREEMENT
+        for kind in (partial(_dropped, start=start), *(() if most else (_views, _rates))):
             if found and found[-1].lags.residual <= DISAGREEMENT:
                 break
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
             # none.
             each = {one.what: one for one in kind(none, rig, names)}.values()
             ranked = sorted(each, key=lambda one: one.paired(rig.cameras)[0])[:_MISTAKES]
-            tried = [(fit.left(), fit, one) for one in ranked for fit in one.near(rig, start)]
+            tried = [(_worst(fit), fit, one) for one in ranked for fit in one.near(rig, start)]
             for now, fit, one in sorted(tried, key=lambda one: one[0]):
                 # Times by which it has to mend the disagreement of all views together.
                 if now > GROSS or 3.0 * now >= left:
@@ -580,6 +584,13 @@ def find_mistake(
                     break
         return min(found, key=lambda one: one.lags.residual, default=None)
     return None
+
+
+def _worst(fit: Adjustment) -> float:
+    """Pixels by which the worst view disagrees in the worst part of the video, but for outliers."""
+    parts = np.array_split(fit.misses, _STRETCHES)
+    views = [view for part in parts for view in np.split(part, len(fit.start), axis=1)]
+    return max(trimmed(view, 0.5) for view in views)
 
 
 def _views(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
@@ -641,12 +652,12 @@ def _dropped(none: Mistake, rig: Rig, names: Sequence[str], start: Floats) -> It
             [x[r] for x, r in zip(each, rows, strict=True)] for each in (none.tracks, none.clocks)
         )
         part = replace(none, tracks=tuple(tracks), clocks=tuple(c - c[0] for c in clocks))
-        ways += [_jumped(none, fit) for fit in part.near(rig, start)]
+        ways += [_jumped(none, none, fit) for fit in part.near(rig, start)]
     for _ in range(_ROUNDS):
         if not ways:
             return
         _, lags, found = min(ways, key=lambda way: way[0])
-        ways = [_jumped(found, fit) for fit in found.fits(rig, lags)]
+        ways = [_jumped(none, found, fit) for fit in found.fits(rig, lags)]
     told = []
     for name, before, after in zip(names, none.clocks, found.clocks, strict=True):
         lacking = np.diff(after - before)
@@ -658,21 +669,22 @@ def _dropped(none: Mistake, rig: Rig, names: Sequence[str], start: Floats) -> It
         yield replace(found, what=", ".join(told))
 
 
-def _jumped(given: Mistake, fit: Adjustment) -> tuple[float, Floats, Mistake]:
+def _jumped(none: Mistake, given: Mistake, fit: Adjustment) -> tuple[float, Floats, Mistake]:
     """With the clock of one video set forward at some frames; what is missed, and its lags.
 
     The lags that leave the least, each jump at a price, by dynamic programming.
     """
-    lags, rates, late = fit.footage.lags, given.rates, np.arange(-_LONGEST, _LONGEST + 1)
-    curves, before, ways = tuple(map(Curve, given.tracks, given.clocks)), 0.0, []
-    for i, (camera, curve) in enumerate(zip(fit.cameras, curves, strict=True)):
-        stride = -(-len(curve.clock) // _FRAMES)
-        clock, track = curve.clock[::stride], curve.track[::stride]
-        instants = (clock + late[:, None]) / rates[i] + lags[i]
+    lags, rates, tried = fit.footage.lags, given.rates, np.arange(-_LONGEST, _LONGEST + 1)
+    curves, missed_before, ways = tuple(map(Curve, given.tracks, given.clocks)), 0.0, []
+    for i, (camera, stated, curve) in enumerate(zip(fit.cameras, none.clocks, curves, strict=True)):
+        stride = -(-len(stated) // _FRAMES)
+        late = (curve.clock - stated)[::stride]
+        middle = np.rint(late.mean())
+        instants = (stated[::stride] + middle + tried[:, None]) / rates[i] + lags[i]
         missed = np.full((len(curves), *instants.shape), np.nan)
         for j, other in enumerate(fit.cameras):
             if j != i:
-                lines = epipolar_lines(camera, track, other)
+                lines = epipolar_lines(camera, curve.track[::stride], other)
                 theirs = curves[j].at((instants - lags[j]) * rates[j])
                 design, target = epipolar_rows(lines, other, theirs)
                 missed[j] = (target - design @ other.scaled_turn) / other.calibration[0]
@@ -680,34 +692,37 @@ def _jumped(given: Mistake, fit: Adjustment) -> tuple[float, Floats, Mistake]:
         cost = np.nansum(costs, axis=0) / np.maximum(seen.sum(axis=0), 1)
         # What nobody saw costs as much as what was seen: no lag is better for leaving frames out.
         cost[~seen.any(axis=0)] = np.nanmean(costs) if seen.any() else 0.0
-        slack = np.diff(clock, prepend=clock[0]) - stride  # by which a clock may be set back
-        least, path = _cheapest(cost.T, np.maximum(slack, 0).astype(int))
-        later = np.repeat(late[path], stride)[: len(curve.clock)]
+        states = np.clip(late - middle + _LONGEST, 0, 2 * _LONGEST).astype(int)
+        path = _cheapest(cost.T)
+        before, least = (_price(cost.T, way) for way in (states, path))
+        missed_before += before / len(late) / 2  # as each pair of views counts twice
+        later = np.repeat(tried[path] + middle, stride)[: len(stated)]
         ahead = np.where(np.arange(len(curves)) == i, later[0] / rates[i], 0.0) + lags
-        clocks = tuple(one.clock + (later - later[0] if one is curve else 0.0) for one in curves)
-        as_it_was = cost[_LONGEST].mean()
-        before += as_it_was / 2  # as each pair of views counts twice
-        gain = as_it_was - least / len(clock)
+        clocks = tuple(stated + later - later[0] if one is curve else one.clock for one in curves)
+        gain = (before - least) / len(late)
         ways.append((gain, ahead - ahead[0], replace(given, clocks=clocks)))
     gain, lags, mended = max(ways, key=lambda way: way[0])
-    return before - gain, lags, mended
+    return missed_before - gain, lags, mended
 
 
-def _cheapest(costs: Floats, slack: Ints) -> tuple[float, Ints]:
-    """The cheapest way through states of such costs, (n, k), each change of the state at a price.
+def _price(costs: Floats, states: Ints) -> float:
+    """Of a way through states of such costs, (n, k), each change of the state at a price."""
+    return float(
+        costs[np.arange(len(states)), states].sum() + _PRICE * np.count_nonzero(np.diff(states))
+    )
 
-    A state is followed by one of at least its own number less the slack, (n,).
-    """
+
+def _cheapest(costs: Floats) -> Ints:
+    """The cheapest way on which the states never fall."""
     states, total = np.arange(costs.shape[1]), costs[0]
     came = np.zeros(costs.shape, dtype=int)
     for k, cost in enumerate(costs[1:], 1):
         least = np.minimum.accumulate(total)
-        lowest = np.maximum.accumulate(np.where(total == least, states, 0))
-        came[k] = lowest[np.minimum(states + slack[k], states[-1])]
-        stay = total <= total[came[k]] + _PRICE
+        came[k] = np.maximum.accumulate(np.where(total == least, states, 0))
+        stay = total <= least + _PRICE
         came[k][stay] = states[stay]
         total = total[came[k]] + np.where(stay, 0.0, _PRICE) + cost
     path = [int(total.argmin())]
     for before in came[:0:-1]:
         path.append(int(before[path[-1]]))
-    return float(total.min()), np.array(path[::-1])
+    return np.array(path[::-1])
