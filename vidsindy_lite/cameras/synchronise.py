@@ -25,7 +25,8 @@ times as large.
 cameras, a mirrored view, v counted upwards, a video of another frame rate than stated, dropped
 frames. `find_mistake` tries all. Two views at a time, the epipolar equation tells by how much they
 disagree at all whole lags; the mistake that mends that best is tried with all cameras. Frames were
-dropped where the best lag of two views jumps.
+dropped of a video where its best lag behind all others jumps; the cameras that tell this are those
+of a part of the videos in which none were.
 """
 
 from __future__ import annotations
@@ -74,34 +75,27 @@ _INSTANTS = 60  # at which two views are compared
 _MISTAKES = 16  # of a kind that mend most, tried with all cameras
 _PART, _PARTS = 0.4, (0.0, 0.3, 0.6)  # of the videos, in which their cameras are learned if frames
 # were dropped elsewhere: how long they are, and where they begin
-_ROUNDS = 3
-_STRETCHES = 20  # of a video, of which the worst tells whether frames were dropped
 _FRAMES = 1500  # of the first video at which a jump of the lag is sought
 _LONGEST = 60  # frames by which it may jump
-_PRICE = 20.0  # of a jump
+_PRICE = 20.0  # of a jump: so many frames at once miss by more than a pixel, if by few
 _MANY = 6  # cameras, of which only two are taken for each other
 _ROUNDING = 1e-9  # scene units, or a share of a slope that is motion
-
-
-def promising_lags(footage: Footage, cameras: Sequence[Camera]) -> list[list[float]]:
-    """Whole lags of each camera behind the first calibrated one, the most promising first."""
-    found = [dips(*misses)[:_PROMISING] or [0.0] for misses in lag_misses(footage, cameras)]
-    found.insert(first_known(cameras), [0.0])
-    return found
 
 
 def lag_misses(
     footage: Footage, cameras: Sequence[Camera], most: int = INSTANTS
 ) -> Iterator[tuple[Floats, Floats]]:
-    """Of each camera but the first calibrated one, all whole lags (k,) and `pair_missed` at these.
+    """Of each camera all whole lags (k,) behind the first calibrated one, and `pair_missed` there.
 
     The misses are at so many instants at most.
     """
-    known, curves, ends = first_known(cameras), footage.curves, footage.lengths
+    known = next(i for i, camera in enumerate(cameras) if camera.is_calibrated)
+    curves, ends = footage.curves, footage.lengths
     frames = curves[known].clock
     frames = frames[:: max(1, len(frames) // most)]
     for other in range(len(curves)):
         if other == known:
+            yield np.zeros(1), np.zeros(1)
             continue
         margin = OVERLAP * min(ends[known], ends[other])
         lags = np.arange(np.ceil(margin - ends[other]), ends[known] - margin + 1)
@@ -114,11 +108,6 @@ def lag_misses(
             theirs = curves[other].at((instants - block[:, None]) * rate)
             missed.append(pair_missed(second, lines, theirs))
         yield lags, np.concatenate(missed)
-
-
-def first_known(cameras: Sequence[Camera]) -> int:
-    """The first calibrated camera."""
-    return next(i for i, camera in enumerate(cameras) if camera.is_calibrated)
 
 
 def pair_missed(other: Camera, lines: tuple[Floats, Floats], theirs: Floats) -> Floats:
@@ -378,7 +367,8 @@ def _learned(videos: _Videos, first: Floats) -> Lags:
 
 def _searched(videos: _Videos, first: Floats) -> tuple[bool, list[Adjustment]]:
     """Whether cameras should be loose, and fits to some of the instants, the best first."""
-    promising = promising_lags(videos.given, videos.known)
+    found = lag_misses(videos.given, videos.known)
+    promising = [dips(*misses)[:_PROMISING] or [0.0] for misses in found]
     exact = _climbed(videos, promising, first, False)
     if not exact or score(exact[0]) <= FINE:
         return False, exact
@@ -519,12 +509,9 @@ class Mistake:
     def paired(self, cameras: Sequence[Camera]) -> tuple[float, Floats]:
         """By how much two views disagree at their best lags, all pairs; and these lags."""
         footage = Footage.of(self.tracks, None, self.rates, self.clocks)
-        least, lags = [], []
-        for tried, left in lag_misses(footage, cameras, _INSTANTS):
-            least.append(left.min())
-            lags.append(tried[left.argmin()])
-        behind = np.insert(lags, first_known(cameras), 0.0)
-        return float(np.linalg.norm(least)), behind - behind[0]
+        each = [*lag_misses(footage, cameras, _INSTANTS)]
+        lags = np.array([tried[left.argmin()] for tried, left in each])
+        return float(np.linalg.norm([left.min() for _, left in each])), lags - lags[0]
 
     def fits(self, rig: Rig, *lags: Floats) -> list[Adjustment]:
         """Cameras and lags near these, roughly."""
@@ -588,7 +575,7 @@ def find_mistake(
 
 def _worst(fit: Adjustment) -> float:
     """Pixels by which the worst view disagrees in the worst part of the video, but for outliers."""
-    parts = np.array_split(fit.misses, _STRETCHES)
+    parts = np.array_split(fit.misses, 20)
     views = [view for part in parts for view in np.split(part, len(fit.start), axis=1)]
     return max(trimmed(view, 0.5) for view in views)
 
@@ -651,9 +638,10 @@ def _dropped(none: Mistake, rig: Rig, names: Sequence[str], start: Floats) -> It
         tracks, clocks = (
             [x[r] for x, r in zip(each, rows, strict=True)] for each in (none.tracks, none.clocks)
         )
-        part = replace(none, tracks=tuple(tracks), clocks=tuple(c - c[0] for c in clocks))
-        ways += [_jumped(none, none, fit) for fit in part.near(rig, start)]
-    for _ in range(_ROUNDS):
+        if min(map(len, tracks)) > 1:
+            part = replace(none, tracks=tuple(tracks), clocks=tuple(c - c[0] for c in clocks))
+            ways += [_jumped(none, none, fit) for fit in part.near(rig, start)]
+    for _ in range(3):  # as what is mended tells the cameras, and these the rest
         if not ways:
             return
         _, lags, found = min(ways, key=lambda way: way[0])
@@ -694,7 +682,10 @@ def _jumped(none: Mistake, given: Mistake, fit: Adjustment) -> tuple[float, Floa
         cost[~seen.any(axis=0)] = np.nanmean(costs) if seen.any() else 0.0
         states = np.clip(late - middle + _LONGEST, 0, 2 * _LONGEST).astype(int)
         path = _cheapest(cost.T)
-        before, least = (_price(cost.T, way) for way in (states, path))
+        before, least = (
+            cost[way, np.arange(len(way))].sum() + _PRICE * np.count_nonzero(np.diff(way))
+            for way in (states, path)
+        )
         missed_before += before / len(late) / 2  # as each pair of views counts twice
         later = np.repeat(tried[path] + middle, stride)[: len(stated)]
         ahead = np.where(np.arange(len(curves)) == i, later[0] / rates[i], 0.0) + lags
@@ -705,15 +696,8 @@ def _jumped(none: Mistake, given: Mistake, fit: Adjustment) -> tuple[float, Floa
     return missed_before - gain, lags, mended
 
 
-def _price(costs: Floats, states: Ints) -> float:
-    """Of a way through states of such costs, (n, k), each change of the state at a price."""
-    return float(
-        costs[np.arange(len(states)), states].sum() + _PRICE * np.count_nonzero(np.diff(states))
-    )
-
-
 def _cheapest(costs: Floats) -> Ints:
-    """The cheapest way on which the states never fall."""
+    """The cheapest way through states of such costs, (n, k), each change at a price; none falls."""
     states, total = np.arange(costs.shape[1]), costs[0]
     came = np.zeros(costs.shape, dtype=int)
     for k, cost in enumerate(costs[1:], 1):
