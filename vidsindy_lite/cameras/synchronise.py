@@ -77,7 +77,7 @@ _PART, _PARTS = 0.4, (0.0, 0.3, 0.6)  # of the videos, in which their cameras ar
 # were dropped elsewhere: how long they are, and where they begin
 _FRAMES = 1500  # of the first video at which a jump of the lag is sought
 _LONGEST = 60  # frames by which it may jump
-_PRICE = 20.0  # of a jump: so many frames at once miss by more than a pixel, if by few
+_PRICE = 20.0  # of a jump, in units of log(1 + miss^2) of a frame
 _MANY = 6  # cameras, of which only two are taken for each other
 _ROUNDING = 1e-9  # scene units, or a share of a slope that is motion
 
