@@ -25,7 +25,8 @@ times as large.
 cameras, a mirrored view, v counted upwards, a video of another frame rate than stated, dropped
 frames. `find_mistake` tries all. Two views at a time, the epipolar equation tells by how much they
 disagree at all whole lags; the mistake that mends that best is tried with all cameras. Frames were
-dropped where the best lag of two views jumps.
+dropped of a video where its best lag behind all others jumps; the cameras that tell this are those
+of a part of the videos in which none were.
 """
 
 from __future__ import annotations
@@ -40,10 +41,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from tqdm import tqdm
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..progress import bar
 from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, known_to
-from .calibrate import check_learnable, closed_form, learn_cameras
+from .calibrate import check_learnable, closed_form
 from .clocks import (
     INSTANTS,
     OVERLAP,
@@ -72,33 +73,29 @@ RATES = ((25, 30), (30, 25), (24, 30), (30, 24), (24, 25), (25, 24), (30, 60), (
 """Rates over those stated that are taken for each other."""
 _INSTANTS = 60  # at which two views are compared
 _MISTAKES = 16  # of a kind that mend most, tried with all cameras
-_PART = 0.4  # of the videos, in which their cameras are learned if frames were dropped elsewhere
+_PART, _PARTS = 0.4, (0.0, 0.3, 0.6)  # of the videos, in which their cameras are learned if frames
+# were dropped elsewhere: how long they are, and where they begin
 _FRAMES = 1500  # of the first video at which a jump of the lag is sought
 _LONGEST = 60  # frames by which it may jump
-_MOST, _PRICE = 8.0, 40.0  # typical misses: the most that one frame counts, and the price of a jump
+_PRICE = 20.0  # of a jump, in units of log(1 + miss^2) of a frame
 _MANY = 6  # cameras, of which only two are taken for each other
 _ROUNDING = 1e-9  # scene units, or a share of a slope that is motion
-
-
-def promising_lags(footage: Footage, cameras: Sequence[Camera]) -> list[list[float]]:
-    """Whole lags of each camera behind the first calibrated one, the most promising first."""
-    found = [dips(*misses)[:_PROMISING] or [0.0] for misses in lag_misses(footage, cameras)]
-    found.insert(first_known(cameras), [0.0])
-    return found
 
 
 def lag_misses(
     footage: Footage, cameras: Sequence[Camera], most: int = INSTANTS
 ) -> Iterator[tuple[Floats, Floats]]:
-    """Of each camera but the first calibrated one, all whole lags (k,) and `pair_missed` at these.
+    """Of each camera all whole lags (k,) behind the first calibrated one, and `pair_missed` there.
 
     The misses are at so many instants at most.
     """
-    known, curves, ends = first_known(cameras), footage.curves, footage.lengths
+    known = next(i for i, camera in enumerate(cameras) if camera.is_calibrated)
+    curves, ends = footage.curves, footage.lengths
     frames = curves[known].clock
     frames = frames[:: max(1, len(frames) // most)]
     for other in range(len(curves)):
         if other == known:
+            yield np.zeros(1), np.zeros(1)
             continue
         margin = OVERLAP * min(ends[known], ends[other])
         lags = np.arange(np.ceil(margin - ends[other]), ends[known] - margin + 1)
@@ -111,11 +108,6 @@ def lag_misses(
             theirs = curves[other].at((instants - block[:, None]) * rate)
             missed.append(pair_missed(second, lines, theirs))
         yield lags, np.concatenate(missed)
-
-
-def first_known(cameras: Sequence[Camera]) -> int:
-    """The first calibrated camera."""
-    return next(i for i, camera in enumerate(cameras) if camera.is_calibrated)
 
 
 def pair_missed(other: Camera, lines: tuple[Floats, Floats], theirs: Floats) -> Floats:
@@ -375,7 +367,8 @@ def _learned(videos: _Videos, first: Floats) -> Lags:
 
 def _searched(videos: _Videos, first: Floats) -> tuple[bool, list[Adjustment]]:
     """Whether cameras should be loose, and fits to some of the instants, the best first."""
-    promising = promising_lags(videos.given, videos.known)
+    found = lag_misses(videos.given, videos.known)
+    promising = [dips(*misses)[:_PROMISING] or [0.0] for misses in found]
     exact = _climbed(videos, promising, first, False)
     if not exact or score(exact[0]) <= FINE:
         return False, exact
@@ -516,18 +509,19 @@ class Mistake:
     def paired(self, cameras: Sequence[Camera]) -> tuple[float, Floats]:
         """By how much two views disagree at their best lags, all pairs; and these lags."""
         footage = Footage.of(self.tracks, None, self.rates, self.clocks)
-        least, lags = [], []
-        for tried, left in lag_misses(footage, cameras, _INSTANTS):
-            least.append(left.min())
-            lags.append(tried[left.argmin()])
-        behind = np.insert(lags, first_known(cameras), 0.0)
-        return float(np.linalg.norm(least)), behind - behind[0]
+        each = [*lag_misses(footage, cameras, _INSTANTS)]
+        lags = np.array([tried[left.argmin()] for tried, left in each])
+        return float(np.linalg.norm([left.min() for _, left in each])), lags - lags[0]
 
-    def left(self, rig: Rig, lags: Floats) -> float:
-        """Pixels by which the worst view disagrees near these lags."""
+    def fits(self, rig: Rig, *lags: Floats) -> list[Adjustment]:
+        """Cameras and lags near these, roughly."""
         videos = _Videos.of(self.tracks, rig, self.rates, self.clocks)
-        found = videos.fitted(lags, rough=True)
-        return np.inf if found is None else found.left()
+        found = [videos.fitted(each, rough=True) for each in np.unique(lags, axis=0)]
+        return [fit for fit in found if fit]
+
+    def near(self, rig: Rig, start: Floats) -> list[Adjustment]:
+        """Near given lags and the best of two views, which are as rough as the rig."""
+        return self.fits(rig, start, self.paired(rig.cameras)[1])
 
 
 def find_mistake(
@@ -549,37 +543,41 @@ def find_mistake(
     """
     none = Mistake("", tuple(tracks), rates, check_clocks(clocks, tracks))
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
-        if none.left(rig, start) <= 2 * DISAGREEMENT:
-            return None
-        left = none.left(rig, none.paired(rig.cameras)[1])
+        begun = none.near(rig, start)
+        left = min(map(_worst, begun), default=np.inf)
         if left <= 2 * DISAGREEMENT:
             return None
         found: list[Mistake] = []
-        for kind in (_views, _rates, partial(_dropped, start=start)):
+        # Whole views are not mistaken where most frames agree.
+        most = min((fit.left() for fit in begun), default=np.inf) <= 2 * DISAGREEMENT
+        for kind in (partial(_dropped, start=start), *(() if most else (_views, _rates))):
             if found and found[-1].lags.residual <= DISAGREEMENT:
                 break
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
             # none.
             each = {one.what: one for one in kind(none, rig, names)}.values()
-            ranked = [(*one.paired(rig.cameras), one) for one in each]
-            ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
-            # Where a rig is rough, so are the best lags of two views: those that are given count.
-            tried = [
-                (one.left(rig, lags), lags, one)
-                for _, best, one in ranked
-                for lags in np.unique([start, best], axis=0)
-            ]
-            for now, best, one in sorted(tried, key=lambda one: one[0]):
+            ranked = sorted(each, key=lambda one: one.paired(rig.cameras)[0])[:_MISTAKES]
+            tried = [(_worst(fit), fit, one) for one in ranked for fit in one.near(rig, start)]
+            for now, fit, one in sorted(tried, key=lambda one: one[0]):
                 # Times by which it has to mend the disagreement of all views together.
-                if 3.0 * now < left:
-                    told = learn_lags(one.tracks, rig, one.rates, best, one.clocks)
-                    if told.agree and told.residual <= 2 * DISAGREEMENT:
-                        others = [o.what for n, _, o in tried if n <= ALIKE * max(now, FINE)]
-                        alike = tuple(dict.fromkeys(o for o in others if o != one.what))
-                        found.append(replace(one, lags=told, before=left, alike=alike))
-                        break
+                if now > GROSS or 3.0 * now >= left:
+                    break
+                lags = fit.footage.lags
+                told = learn_lags(one.tracks, rig, one.rates, lags, one.clocks)
+                if told.agree and told.residual <= 2 * DISAGREEMENT:
+                    others = [o.what for n, _, o in tried if n <= ALIKE * max(now, FINE)]
+                    alike = tuple(dict.fromkeys(o for o in others if o != one.what))
+                    found.append(replace(one, lags=told, before=left, alike=alike))
+                    break
         return min(found, key=lambda one: one.lags.residual, default=None)
     return None
+
+
+def _worst(fit: Adjustment) -> float:
+    """Pixels by which the worst view disagrees in the worst part of the video, but for outliers."""
+    parts = np.array_split(fit.misses, 20)
+    views = [view for part in parts for view in np.split(part, len(fit.start), axis=1)]
+    return max(trimmed(view, 0.5) for view in views)
 
 
 def _views(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
@@ -632,78 +630,83 @@ def _rates(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
 
 
 def _dropped(none: Mistake, rig: Rig, names: Sequence[str], start: Floats) -> Iterator[Mistake]:
-    """Videos of which frames were dropped, each with the clock by which it agrees all the time."""
-    length = min(clock[-1] / rate for clock, rate in zip(none.clocks, none.rates, strict=True))
-    curves = tuple(map(Curve, none.tracks, none.clocks))
-    for low, high in ((0.0, _PART), (1 - _PART, 1.0)):  # in one of them none is dropped, maybe
-        ends = length * np.outer(none.rates, [low, high])
-        rows = [(e[0] <= c) & (c <= e[1]) for c, e in zip(none.clocks, ends, strict=True)]
-        tracks = tuple(t[part] for t, part in zip(none.tracks, rows, strict=True))
-        clocks = tuple(c[r] - e[0] for c, r, e in zip(none.clocks, rows, ends, strict=True))
-        try:
-            best = learn_lags(tracks, rig, none.rates, start, clocks)
-            views = align(tracks, best.frames, none.rates, clocks)
-            cameras = learn_cameras(views, rig).cameras
-        except ValueError:
-            continue
-        if not best.agree:
-            continue
-        jumps = [_jumps(curves, none.rates, cameras, best.frames, j) for j in range(1, len(names))]
-        if all(found and found[0][2] < 0 for found in jumps):  # it is the first that lacks some
-            each = {0: [(frame, -jump) for frame, _, jump in jumps[0]]}
-        else:
-            each = {j: [found[1:] for found in jumps[j - 1]] for j in range(1, len(names))}
-        mended, told = list(none.clocks), []
-        for j, found in each.items():
-            mended[j] = clock = mended[j].copy()
-            lacking: dict[int, int] = {}
-            for place, jump in found:
-                row = int(np.clip(np.rint(place), 0, len(clock) - 1))
-                lacking[row] = lacking.get(row, 0) + round(jump * none.rates[j])
-            for row, count in lacking.items():
-                clock[row:] += count
-                if count:
-                    told.append(f"{count} frames dropped of {names[j]} before its frame {row}")
-        if told and all((np.diff(clock) > 0).all() for clock in mended):
-            yield replace(none, what=", ".join(told), clocks=tuple(mended))
+    """Videos of which frames were dropped, with the clocks by which they agree all the time."""
+    length, ways = Footage.of(none.tracks, None, none.rates, none.clocks).lengths.min(), []
+    for low in _PARTS:  # in one of them none is dropped, maybe: its cameras tell when
+        begins, ends = length * np.outer([low, low + _PART], none.rates)
+        rows = [(b <= c) & (c <= e) for b, c, e in zip(begins, none.clocks, ends, strict=True)]
+        tracks, clocks = (
+            [x[r] for x, r in zip(each, rows, strict=True)] for each in (none.tracks, none.clocks)
+        )
+        if min(map(len, tracks)) > 1:
+            part = replace(none, tracks=tuple(tracks), clocks=tuple(c - c[0] for c in clocks))
+            ways += [_jumped(none, none, fit) for fit in part.near(rig, start)]
+    for _ in range(3):  # as what is mended tells the cameras, and these the rest
+        if not ways:
+            return
+        _, lags, found = min(ways, key=lambda way: way[0])
+        ways = [_jumped(none, found, fit) for fit in found.fits(rig, lags)]
+    told = []
+    for name, before, after in zip(names, none.clocks, found.clocks, strict=True):
+        lacking = np.diff(after - before)
+        told += [
+            f"{lacking[k]:.0f} frames dropped of {name} before its frame {k + 1}"
+            for k in np.flatnonzero(lacking)
+        ]
+    if told:
+        yield replace(found, what=", ".join(told))
 
 
-def _jumps(
-    curves: Sequence[Curve], rates: Floats, cameras: Sequence[Camera], lags: Floats, j: int
-) -> list[tuple[float, float, float]]:
-    """Frames of the first video and of another where its lag behind the first jumps; by how much.
+def _jumped(none: Mistake, given: Mistake, fit: Adjustment) -> tuple[float, Floats, Mistake]:
+    """With the clock of one video set forward at some frames; what is missed, and its lags.
 
     The lags that leave the least, each jump at a price, by dynamic programming.
     """
-    stride = -(-len(curves[0].clock) // _FRAMES)
-    frames = curves[0].clock[::stride]
-    tried = lags[j] - lags[0] + np.arange(-_LONGEST, _LONGEST + 1)
-    lines = epipolar_lines(cameras[0], curves[0].at(frames), cameras[j])
-    theirs = curves[j].at((frames - tried[:, None]) * rates[j])
-    design, target = epipolar_rows(lines, cameras[j], theirs)
-    missed = np.abs(target - design @ cameras[j].scaled_turn)
-    usual = missed[_LONGEST][np.isfinite(missed[_LONGEST])]
-    if not usual.size:
-        return []
-    typical = max(float(np.quantile(usual, _PART / 2)), _ROUNDING)
-    # What nobody saw costs as much as what was seen: no lag is better for leaving frames out.
-    cost = np.minimum(missed / typical, _MOST)
-    cost = np.nan_to_num(cost, nan=float(np.minimum(usual / typical, _MOST).mean()))
-    # Both clocks go on: a lag that grows passes frames of the first video which the other lacks.
-    jumps = tried[:, None] - tried
-    passed = np.maximum(np.ceil(jumps / stride), 1).astype(int)
-    price = np.where(jumps == 0, 0.0, _PRICE + cost.mean(axis=1).min() * (passed - 1))
-    total, came = np.full(cost.T.shape, np.inf), np.zeros(cost.T.shape, dtype=int)
-    total[0], every = cost[:, 0], np.arange(len(tried))
-    for k in range(1, len(frames)):
-        ways = price + np.where(passed <= k, total[np.maximum(k - passed, 0), every], np.inf)
-        came[k] = ways.argmin(axis=1)
-        total[k] = ways[every, came[k]] + cost[:, k]
-    k, now, found = len(frames) - 1, int(total[-1].argmin()), []
-    while k > 0:
-        then = int(came[k, now])
-        if then != now:
-            place = (frames[k] - tried[now]) * rates[j]
-            found.append((float(frames[k]), float(place), float(jumps[now, then])))
-        k, now = k - int(passed[now, then]), then
-    return found[::-1]
+    lags, rates, tried = fit.footage.lags, given.rates, np.arange(-_LONGEST, _LONGEST + 1)
+    curves, missed_before, ways = tuple(map(Curve, given.tracks, given.clocks)), 0.0, []
+    for i, (camera, stated, curve) in enumerate(zip(fit.cameras, none.clocks, curves, strict=True)):
+        stride = -(-len(stated) // _FRAMES)
+        late = (curve.clock - stated)[::stride]
+        middle = np.rint(late.mean())
+        instants = (stated[::stride] + middle + tried[:, None]) / rates[i] + lags[i]
+        missed = np.full((len(curves), *instants.shape), np.nan)
+        for j, other in enumerate(fit.cameras):
+            if j != i:
+                lines = epipolar_lines(camera, curve.track[::stride], other)
+                theirs = curves[j].at((instants - lags[j]) * rates[j])
+                design, target = epipolar_rows(lines, other, theirs)
+                missed[j] = (target - design @ other.scaled_turn) / other.calibration[0]
+        seen, costs = np.isfinite(missed), np.log1p((missed / DISAGREEMENT) ** 2)
+        cost = np.nansum(costs, axis=0) / np.maximum(seen.sum(axis=0), 1)
+        # What nobody saw costs as much as what was seen: no lag is better for leaving frames out.
+        cost[~seen.any(axis=0)] = np.nanmean(costs) if seen.any() else 0.0
+        states = np.clip(late - middle + _LONGEST, 0, 2 * _LONGEST).astype(int)
+        path = _cheapest(cost.T)
+        before, least = (
+            cost[way, np.arange(len(way))].sum() + _PRICE * np.count_nonzero(np.diff(way))
+            for way in (states, path)
+        )
+        missed_before += before / len(late) / 2  # as each pair of views counts twice
+        later = np.repeat(tried[path] + middle, stride)[: len(stated)]
+        ahead = np.where(np.arange(len(curves)) == i, later[0] / rates[i], 0.0) + lags
+        clocks = tuple(stated + later - later[0] if one is curve else one.clock for one in curves)
+        gain = (before - least) / len(late)
+        ways.append((gain, ahead - ahead[0], replace(given, clocks=clocks)))
+    gain, lags, mended = max(ways, key=lambda way: way[0])
+    return missed_before - gain, lags, mended
+
+
+def _cheapest(costs: Floats) -> Ints:
+    """The cheapest way through states of such costs, (n, k), each change at a price; none falls."""
+    states, total = np.arange(costs.shape[1]), costs[0]
+    came = np.zeros(costs.shape, dtype=int)
+    for k, cost in enumerate(costs[1:], 1):
+        least = np.minimum.accumulate(total)
+        came[k] = np.maximum.accumulate(np.where(total == least, states, 0))
+        stay = total <= least + _PRICE
+        came[k][stay] = states[stay]
+        total = total[came[k]] + np.where(stay, 0.0, _PRICE) + cost
+    path = [int(total.argmin())]
+    for before in came[:0:-1]:
+        path.append(int(before[path[-1]]))
+    return np.array(path[::-1])
