@@ -358,7 +358,7 @@ class Collocation:
         return self.data_loss(curve) + float(squares @ self.physics_weights)
 
     def linearise(
-        self, state: State, columns: Ints, damping: float = 0.0, parts: Sequence[Bools] = ()
+        self, state: State, columns: Ints, damping: float = 0.0, part: Bools | None = None
     ) -> WithCurve:
         """Linearise around a state and eliminate the control points.
 
@@ -370,8 +370,9 @@ class Collocation:
             Entries of `State.flat` to keep as unknowns, active or not.
         damping : float
             Relative Levenberg-Marquardt damping of the control points.
-        parts : sequence of ndarray of bool, shape (k,)
-            Nodes at which all columns once more are unknowns of their own, after the others.
+        part : ndarray of bool, shape (k,), optional
+            Nodes at which all columns once more are unknowns of their own: these come after the
+            others, their numbers larger by the size of `State.flat`.
 
         Raises
         ------
@@ -380,12 +381,10 @@ class Collocation:
         """
         curve, x, slope = self.grid.along(state.control_points)
         physics, unknowns = self._derivatives(state, columns, x, slope)
-        if parts:
-            left, rates, rest = np.split(unknowns, [1, 1 + len(columns)], axis=1)
-            own = [rates * part.repeat(self.d)[:, None] for part in parts]
-            unknowns = np.hstack([left, rates, *own, rest])
-            size = len(state.sources)
-            columns = np.concatenate([columns + k * size for k in range(1 + len(parts))])
+        if part is not None:
+            own = unknowns[:, 1 : 1 + len(columns)] * part.repeat(self.d)[:, None]
+            unknowns = np.insert(unknowns, [1 + len(columns)], own, axis=1)
+            columns = np.append(columns, columns + len(state.sources))
         data_residual, sizes = self._left(curve)
         factor = self._factor(physics, damping)
 

@@ -828,15 +828,20 @@ def _rivals(
     yield from untold_origins(origins, remedy)
 
 
-def _changing(problem: Problem, fit: Fit, tolerated: float) -> Iterator[str]:
+def _changing(problem: Problem, fit: Fit, tolerated: float, most: int = 8) -> Iterator[str]:
     """Has the law other coefficients in a part of the data: a run, the second half, before jumps?
 
     Chow's test of their constancy (1960), by its score: what they would explain if they were free
-    in that part, at the errors that are tolerated.
+    in that part, at the errors that are tolerated. Of runs ``most`` are asked, which fit worst.
     """
-    grid, own = fit.collocation.grid, np.flatnonzero(fit.state.free())
-    runs = np.unique(grid.runs)
-    parts = {f"run {run}": grid.runs == run for run in runs.tolist()}
+    collocation, state = fit.collocation, fit.state
+    grid, own = collocation.grid, np.flatnonzero(state.free())
+    run_of = np.repeat([s.trajectory for s in grid.segments], [len(s.t) for s in grid.segments])
+    residual, _ = collocation.data_residual(state.control_points)
+    squares = (residual**2 * collocation.sample_weights).sum(axis=1)
+    runs, place, counts = np.unique(run_of, return_inverse=True, return_counts=True)
+    worst = runs[np.argsort(-np.bincount(place, squares) / counts)[:most]]
+    parts = {f"run {run}": grid.runs == run for run in worst.tolist()}
     if len(runs) == 1:
         parts = {"the second half of the data": np.arange(len(grid.runs)) >= len(grid.runs) / 2}
     step, before = typical_step(problem.trajectories), np.zeros(len(grid.runs), dtype=bool)
@@ -845,12 +850,8 @@ def _changing(problem: Problem, fit: Fit, tolerated: float) -> Iterator[str]:
         before |= (grid.runs == run) & ((early > 0) & (early < step)).any(axis=1)
     if before.any():
         parts["the sample before a jump of an input"] = before
-    model = fit.collocation.linearise(fit.state, own, parts=list(parts.values()))
-    size = len(fit.state.flat())
-    gains = [
-        (model.of(np.append(own, own + (1 + k) * size)).newton()[1] - model.fall) / tolerated**2
-        for k in range(len(parts))
-    ]
+    models = [collocation.linearise(state, own, part=part) for part in parts.values()]
+    gains = [(model.newton()[1] - model.fall) / tolerated**2 for model in models]
     gain, where = max(zip(gains, parts, strict=True))
     if more_than_chance(gain, len(own)):
         yield (
