@@ -646,15 +646,15 @@ def _dropped(none: Mistake, rig: Rig, names: Sequence[str], start: Floats) -> It
             return
         _, lags, found = min(ways, key=lambda way: way[0])
         ways = [_jumped(none, found, fit) for fit in found.fits(rig, lags)]
-    told = []
-    for name, before, after in zip(names, none.clocks, found.clocks, strict=True):
-        lacking = np.diff(after - before)
-        told += [
-            f"{lacking[k]:.0f} frames dropped of {name} before its frame {k + 1}"
-            for k in np.flatnonzero(lacking)
-        ]
-    if told:
-        yield replace(found, what=", ".join(told))
+    lacking = [np.diff(now - then) for now, then in zip(found.clocks, none.clocks, strict=True)]
+    told = [
+        f"{missing[k]:.0f} frames dropped of {name} before its frame {k + 1}"
+        for name, missing in zip(names, lacking, strict=True)
+        for k in np.flatnonzero(missing)
+    ]
+    if told:  # of several places one may have taken a few frames of another
+        about = "about " if len(told) > 1 else ""
+        yield replace(found, what=", ".join(about + one for one in told))
 
 
 def _jumped(none: Mistake, given: Mistake, fit: Adjustment) -> tuple[float, Floats, Mistake]:
