@@ -144,6 +144,12 @@ def contested(studio):
     return told(vl.discover, t, law.simulate(t, (1, 0)), degree=2)
 
 
+def unlike(studio):
+    t, rng = np.linspace(0, 30, 200), np.random.default_rng(0)
+    pair = [np.stack([np.cos(w * t), -w * np.sin(w * t)], axis=1) for w in (1, 1.02)]
+    return told(vl.discover, [(t, add_noise(x, 0.05, rng)) for x in pair], degree=1, order=1)
+
+
 def jumping(studio):
     t = np.linspace(0, 20, 100)
     x = np.column_stack((np.cos(t), -np.sin(t)))
@@ -213,6 +219,7 @@ TROUBLES = {
     "must make the views agree": lambda studio: studio.says(lags=(0, 5, 0)),
     "the curve misses the data": lambda studio: pendulum(degree=1),
     "another law may as well be true": undecided,
+    "has other coefficients than the rest": unlike,
     "is settled by how large an error is tolerated": contested,
     "a sample lies far from those before and after it": jumping,
     "turns of the motion": lambda studio: oscillation(0.01, 200, 0.05),
