@@ -556,8 +556,13 @@ def find_mistake(
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
             # none.
             each = {one.what: one for one in kind(none, rig, names)}.values()
-            ranked = sorted(each, key=lambda one: one.paired(rig.cameras)[0])[:_MISTAKES]
-            tried = [(_worst(fit), fit, one) for one in ranked for fit in one.near(rig, start)]
+            ranked = [(*one.paired(rig.cameras), one) for one in each]
+            ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
+            tried = [
+                (_worst(fit), fit, one)
+                for _, best, one in ranked
+                for fit in one.fits(rig, start, best)
+            ]
             for now, fit, one in sorted(tried, key=lambda one: one[0]):
                 # Times by which it has to mend the disagreement of all views together.
                 if now > GROSS or 3.0 * now >= left:

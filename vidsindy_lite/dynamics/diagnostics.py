@@ -841,13 +841,14 @@ def _changing(problem: Problem, fit: Fit, tolerated: float, most: int = 8) -> It
     squares = (residual**2 * collocation.sample_weights).sum(axis=1)
     runs, place, counts = np.unique(run_of, return_inverse=True, return_counts=True)
     worst = runs[np.argsort(-np.bincount(place, squares) / counts)[:most]]
-    parts = {f"run {run}": grid.runs == run for run in worst.tolist()}
+    here = grid.runs
+    parts = {f"run {run}": here == run for run in worst.tolist()}
     if len(runs) == 1:
-        parts = {"the second half of the data": np.arange(len(grid.runs)) >= len(grid.runs) / 2}
-    step, before = typical_step(problem.trajectories), np.zeros(len(grid.runs), dtype=bool)
+        parts = {"the second half of the data": np.arange(len(here)) >= len(here) / 2}
+    step, before = typical_step(problem.trajectories), np.zeros(len(here), dtype=bool)
     for run, jumps in enumerate(problem.jumps):
         early = jumps - grid.node_times[:, None]
-        before |= (grid.runs == run) & ((early > 0) & (early < step)).any(axis=1)
+        before |= (here == run) & ((early > 0) & (early < step)).any(axis=1)
     if before.any():
         parts["the sample before a jump of an input"] = before
     models = [collocation.linearise(state, own, part=part) for part in parts.values()]
