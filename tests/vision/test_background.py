@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.vision.background import (
-    BackgroundModel,
     Plate,
     least_difference,
     lights_of,
@@ -14,79 +13,6 @@ from vidsindy_lite.vision.background import (
 )
 
 SIZE = (128, 96)
-
-
-def learned(samples):
-    model = BackgroundModel(samples)
-    model.learn_target(samples)
-    return model
-
-
-GROUND, TARGET = (90, 100, 110), (20, 40, 220)
-
-
-def squares(*boxes, colour=TARGET):
-    """A frame with squares (left, top, side), on whole pixels."""
-    frame = np.full((SIZE[1], SIZE[0], 3), GROUND, np.uint8)
-    for left, top, side in boxes:
-        frame[max(top, 0) : top + side, max(left, 0) : left + side] = colour
-    return frame
-
-
-@pytest.fixture(scope="module")
-def plain():
-    """A model that has seen a square of 16 pixels in 20 places."""
-    return learned(np.array([squares((4 + 5 * i, 4 + 3 * i, 16)) for i in range(20)]))
-
-
-@pytest.mark.parametrize(
-    ("left", "top", "inside"),
-    [(40, 24, True), (1, 1, True), (111, 79, True),
-     (0, 30, False), (30, 0, False), (112, 30, False), (30, 80, False)],
-)  # fmt: skip
-def test_a_square_is_measured_exactly_and_at_the_border_it_may_go_on(plain, left, top, inside):
-    blob = plain.measure(squares((left, top, 16)), np.array([left + 7.5, top + 7.5]), 14)
-    np.testing.assert_allclose(blob.centroid, [left + 7.5, top + 7.5], atol=1e-3)
-    assert blob.area == pytest.approx(16**2, rel=1e-3)
-    assert blob.inside == inside
-
-
-@pytest.mark.parametrize(("side", "is_target"), [(6, False), (8, True), (32, True), (40, False)])
-def test_what_has_five_times_the_area_of_the_target_or_a_fifth_is_none(plain, side, is_target):
-    found = plain.measure(squares((30, 30, side)), np.full(2, 30 + (side - 1) / 2), 30)
-    assert (found is not None) == is_target
-
-
-def test_a_target_of_several_colours_is_told():
-    def film(width):
-        frames = [squares((4 + 5 * i, 4 + 3 * i, 16)) for i in range(20)]
-        for i, frame in enumerate(frames):
-            frame[4 + 3 * i : 20 + 3 * i, 4 + 5 * i : 4 + 5 * i + width] = (120, 100, 10)
-        return np.array(frames)
-
-    assert not learned(film(0)).several_colours
-    assert not learned(film(4)).several_colours
-    assert learned(film(6)).several_colours
-
-
-@pytest.mark.parametrize(("left", "top"), [(40, 24), (112, 80)])
-def test_a_square_that_stays_in_most_samples_is_no_background(left, top):
-    stays = [squares((left, top, 16))] * 13
-    leaves = [squares((76 + i, 4 + i, 16)) for i in range(0, 16, 2)]
-    model = learned(np.array(stays + leaves))
-    np.testing.assert_array_equal(model.background, squares())
-    assert model.area == 16**2
-
-
-@pytest.mark.parametrize(("reach", "shows"), [(3, True), (7, True), (30, False)])
-def test_a_part_of_a_target_that_is_in_the_background_shows(reach, shows):
-    """A disc that turns around a place: all of its views cover what is within 9 - `reach` of it."""
-    samples = np.full((21, 90, 120, 3), 150, np.uint8)
-    for k, sample in enumerate(samples):
-        place = [60 + reach * np.cos(2.4 * k), 45 + reach * np.sin(2.4 * k)]
-        cv2.circle(sample, tuple(np.rint(16 * np.array(place)).astype(int)), 16 * 9, (20, 30, 220),
-                   -1, cv2.LINE_AA, 4)  # fmt: skip
-    assert learned(samples).shows_target() == shows
 
 
 def panning(frames, u, v=0):

@@ -16,9 +16,9 @@ def test_the_frames_of_a_camera_that_trembles_before_a_sky_lie_in_the_first(tmp_
     phone = Phone("sky", 40, noise=3, camera="trembling", image_size=(320, 240), frames=60)
     frames, here, there = map(np.array, zip(*render_phone(phone, 2), strict=True))
     film = Reel(write_video(tmp_path / "clip.mkv", frames))
-    motion, sure = camera_motion(film, sample_frames(film), sampled(60))
+    motion, doubts = camera_motion(film, sample_frames(film), sampled(60))
     error = np.linalg.norm(carry(motion.maps, there) - here, axis=1)
-    assert sure
+    assert not doubts
     assert np.median(error) < 0.2 * np.median(np.linalg.norm(there - here, axis=1))
     assert np.sqrt(np.mean(error**2)) < 2 * np.sqrt(2 * np.mean(motion.errors**2))
 

@@ -455,9 +455,10 @@ def explains(samples: Image, maps: Floats, known: Bools) -> bool:
 
 
 def rests(samples: Image) -> bool:
-    """Are reduced frames likelier with a camera at rest than with one a pixel off, to any side?
+    """Are reduced frames likelier with a camera at rest than with one a pixel off along an axis?
 
-    Not so if it moves, nor if there is too little to see.
+    Not so if it moves, nor if there is too little to see. No camera that is held moves along one
+    axis only.
     """
     rest = np.broadcast_to(np.eye(3), (len(samples), 3, 3))
     plate = Plate(samples, rest, np.ones(len(samples), bool))
@@ -465,9 +466,8 @@ def rests(samples: Image) -> bool:
         _missed(samples, plate, rest + np.array([[0, 0, u], [0, 0, v], [0, 0, 0]]))
         for u, v in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
     )
-    least = [
-        min(_gain(one, other) for other in off) for one, *off in zip(here, *beside, strict=True)
-    ]
+    gains = ([_gain(one, other) for other in off] for one, *off in zip(here, *beside, strict=True))
+    least = [max(min(gain[:2]), min(gain[2:])) for gain in gains]
     # Share of the frames that say so, if the camera is at rest.
     return bool(np.mean(np.array(least) > 0) >= 0.9)
 
@@ -507,8 +507,10 @@ def _gain(one: Floats32, other: Floats32) -> float:
     return float(ratios[aside : len(ratios) - aside].mean())
 
 
-def camera_motion(frames: Reel, small: Image, sampled: Ints) -> tuple[CameraMotion, bool]:
-    """The camera's motion, and whether that is sure.
+def camera_motion(
+    frames: Reel, small: Image, sampled: Ints
+) -> tuple[CameraMotion, tuple[str, ...]]:
+    """The camera's motion, and doubts of it.
 
     If the sampled frames do not tell that the camera is at rest, all frames are asked where they
     lie, one after the other.
@@ -516,8 +518,12 @@ def camera_motion(frames: Reel, small: Image, sampled: Ints) -> tuple[CameraMoti
     still = stands_still(small)
     motion = _followed(frames, small, sampled) if still is False else None
     if motion is not None:
-        return motion, True
-    return at_rest(frames.info.frames), still is True or rests(small)
+        return motion, ()
+    doubts: tuple[str, ...] = ()
+    if not still and not rests(small):
+        doubts = ("the background is too plain to tell whether the camera moves: if so, its "
+                  "motion is part of the track",)  # fmt: skip
+    return at_rest(frames.info.frames), doubts
 
 
 def _followed(frames: Reel, small: Image, sampled: Ints) -> CameraMotion | None:

@@ -371,8 +371,12 @@ class Motion(NamedTuple):
     rating: float
 
 
-def best_path(seen: Candidates, longest: int = GAP) -> tuple[Ints, float]:
-    """The rows of the path of the highest value, whose gaps have a longest, and that value."""
+def best_path(seen: Candidates, *, away: bool = False) -> tuple[Ints, float]:
+    """The rows of the path of the highest value, and that value.
+
+    A target may be away for a few frames, or for any time: then a candidate follows one of those
+    before it, or one of the best of all that are older.
+    """
     if not len(seen.frame):
         return np.zeros(0, int), 0.0
     size = seen.size + 2
@@ -381,10 +385,9 @@ def best_path(seen: Candidates, longest: int = GAP) -> tuple[Ints, float]:
     speed, bent = np.full((2, len(size), 2), np.nan)
     bounds = np.searchsorted(seen.frame, np.arange(seen.frame[-1] + 2))
     for i in np.unique(seen.frame):
-        new, old = (
-            np.arange(bounds[i], bounds[i + 1]),
-            np.arange(bounds[max(i - longest, 0)], bounds[i]),
-        )
+        new, recent = np.arange(bounds[i], bounds[i + 1]), bounds[max(i - GAP, 0)]
+        older = np.argsort(-value[:recent], kind="stable")[: _KEPT * away]
+        old = np.concatenate([older, np.arange(recent, bounds[i])])
         if not len(old):
             continue
         gap = (i - seen.frame[old])[:, None]
@@ -592,9 +595,9 @@ def followed(
             if i == first:
                 looks = Appearance(frame, middle, size, factor)
             like[here] = _likeness(looks, frame[::factor, ::factor], found.box[here])
-            if i == first:
-                continue
             gap = abs(i - last[-1][0])
+            if i == first or gap > 60:  # frames after which nothing is known of its looks
+                continue
             speed = way * pace
             if len(last) > 1:
                 speed = (last[-1][1] - last[-2][1]) / abs(last[-1][0] - last[-2][0])
@@ -616,8 +619,6 @@ def followed(
             # What differs from the ground and has its colours may be blurred or turned.
             sure = answer > max(0.12, 0.35 * usual) or (moved and colour > 0.5)
             if not (inside and sure):
-                if gap > 60:
-                    break
                 continue
             usual = 0.95 * usual + 0.05 * answer
             for grown in (0.96, 1.04) if i % 2 else ():

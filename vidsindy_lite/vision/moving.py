@@ -1,11 +1,11 @@
-"""What moves before a background that is steadied: the tracker for films that people make.
+"""What moves before a background that is steadied: the tracker for films.
 
 ::
 
-  camera        its motion is taken out, so that tracks come in the first frame's pixels
+  camera        its motion is taken out, if it moves: tracks come in the first frame's pixels
   candidates    all that differs from the ground or from other frames
   association   the best path through them
-  appearance    what lies on it is learned and followed by its looks, too
+  appearance    if it has gaps or rivals, what lies on it is learned and followed by its looks
   association   again, with both kinds of evidence
   refining      its places to a fraction of a pixel, in whole frames; doubts
 
@@ -17,11 +17,13 @@ one meeting to the next.
 """
 
 import os
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple, Self
 
+import cv2
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
@@ -29,7 +31,6 @@ from ..arrays import Bools, Floats, Floats32, Image, Ints
 from ..checks import check_integer
 from .background import (
     LONGEST,
-    BackgroundModel,
     Plate,
     carry,
     lights_of,
@@ -37,7 +38,7 @@ from .background import (
     sample_frames,
     sampled,
 )
-from .camera import LOOSE, CameraMotion, at_rest, camera_motion, rescaled
+from .camera import LOOSE, CameraMotion, at_rest, camera_motion, rescaled, stands_still
 from .candidates import (
     TOLD,
     Candidates,
@@ -50,10 +51,11 @@ from .candidates import (
     plainest_paths,
     uncommon,
 )
-from .refining import WHOLE, Lens, View, entire, fitting, hidden, roughness, swapped
+from .refining import Lens, View, entire, fitting, roughness, swapped
 from .video import Reel, reduce
 
 _SHORTEST = 5  # frames of a path
+_LOUD = 12.0  # grey levels of noise, in more of which no pixel is told alone
 _LOOKS_ALONE = "no view tells it from its ground: it is followed by its looks alone"
 
 
@@ -67,10 +69,11 @@ class Track:
         Centroid of the target, (u right, v down) in pixels of the first frame, pixel centres at
         integers; NaN in frames where it is not seen, or only a part of it, or not for sure.
     confidence : ndarray, shape (n,)
-        From 0, nothing seen, to 1. A detector says how sure it is of each frame; the background
-        model how much the view is like those of the whole target.
+        From 0, nothing seen, to 1. A detector says how sure it is of each frame; else it is
+        exp(-e / 3) in a place that is known to e pixels.
     detector : str
-        What found it: "background", "motion", "learned" or the name of an .onnx file.
+        What found it: "background", before a background at rest, "motion", where that of the camera
+        was taken out, "learned" or the name of an .onnx file.
     warnings : tuple of str
         Reasons not to trust the track.
     maps : ndarray, shape (n, 3, 3), optional
@@ -97,8 +100,8 @@ class Track:
 class Film(NamedTuple):
     """What is known of a film before its target: `small`, `maps` and `plate` are of reduced frames.
 
-    `lights` (m, 3) say how much brighter each of its samples is than most. `sure` is whether its
-    camera is known to be at rest, or to move as `motion` says.
+    `lights` (m, 3) say how much brighter each of its samples is than most; `doubts`, why its camera
+    may move other than `motion` says.
     """
 
     frames: Reel
@@ -107,7 +110,7 @@ class Film(NamedTuple):
     small: Image
     sampled: Ints
     lights: Floats32
-    sure: bool
+    doubts: tuple[str, ...]
 
     @property
     def factor(self) -> int:
@@ -115,18 +118,21 @@ class Film(NamedTuple):
         return self.frames.factor
 
     @classmethod
-    def of(cls, frames: Reel, samples: Image, rests: bool = False) -> Self:
+    def of(cls, frames: Reel, samples: Image, *, rests: bool = False) -> Self:
         """From its sampled frames, and from all of them if its camera may move."""
         info, factor = frames.info, frames.factor
         numbers = sampled(info.frames)[: len(samples)]
         small = np.array([reduce(sample, factor) for sample in samples])
-        motion, sure = at_rest(info.frames), True
+        doubts: tuple[str, ...] = ()
+        motion = at_rest(info.frames)
         if not rests:
-            motion, sure = camera_motion(frames, small, numbers)
+            motion, doubts = camera_motion(frames, small, numbers)
+        elif stands_still(small) is False:
+            doubts = ("the camera moves, and its motion is part of the track",)
         numbers = np.minimum(numbers, len(motion.maps) - 1)
         maps, known = rescaled(motion.maps, factor), np.isfinite(motion.errors)
         lights = lights_of(small, maps[numbers], known[numbers])
-        return cls(frames, motion, maps, small, numbers, lights, sure)
+        return cls(frames, motion, maps, small, numbers, lights, doubts)
 
     def plate(self, samples: Image, maps: Floats, boxes: Floats | None = None) -> Plate:
         """The ground, without what is in boxes (n, 4) of the frames."""
@@ -145,12 +151,14 @@ class Ways(NamedTuple):
     colour: Floats
 
 
-def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
+def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = False) -> Track:
     """Track what moves in a film, the target if there is a hint which it is.
 
-    `samples` are frames spread evenly over the film, see `sample_frames`.
+    Its camera `rests` if that is known.
     """
-    film = Film.of(frames, samples)
+    frames = Reel(path, LONGEST)
+    samples = sample_frames(frames)
+    film = Film.of(frames, samples, rests=rests)
     seen, lights = sighted(film)
     n = min(len(film.maps), len(lights))
     boxed = None if hint is None else hint.boxed(frames.info.size, n, film.factor)
@@ -172,11 +180,12 @@ def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
         (seen, lights), paths = others, plainer
     rows = paths[0].rows if paths else np.zeros(0, int)
     start = seed or _plainest(seen, rows)
-    near = rows[np.abs(seen.frame[rows] - start[0]) <= 2]
-    pace = np.polyfit(seen.frame[near], seen.place[near], 1)[0] if len(near) > 1 else np.zeros(2)
-    looks = followed(frames, film.maps[:n], seen, start, pace)
+    if seed is None and len(rows) == n and not _rivals(paths):  # nothing is left to be told
+        looks = Looks(np.full((n, 4), np.nan), np.zeros(n), np.ones(len(seen.frame)))
+    else:
+        looks = followed(frames, film.maps[:n], seen, start, _pace(seen, rows, start[0]))
     both = _together(seen, looks, film.maps, start[0], told=seed is not None)
-    rows, _ = best_path(both)
+    rows, _ = best_path(both, away=True)
     if len(rows) < _SHORTEST:
         return nothing(film.motion, n)
     doubts = _doubts(film, seen, paths, hint)
@@ -188,8 +197,8 @@ def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
     if hint is not None and hint.colour is not None and any(views):
         colour = np.median([view.colour for view in views if view], axis=0)
         doubts += hint.unlike(colour)
-    found = finished(views, film.motion, doubts)
-    found = _filled(found, film, views, looks, ways, seed)
+    found, bound = finished(views, film.motion, doubts)
+    found = _filled(found, bound, film, views, looks, ways, seed)
     return replace(found, warnings=found.warnings + unsure(found))
 
 
@@ -212,7 +221,11 @@ def sighted(
     """What may be the target in each frame, and how bright the frame is."""
     plate = film.plate(film.small, film.maps, boxes)
     noise = noise_of(film.small, film.maps[film.sampled], plate)
-    found, lights = candidates(film.frames, film.maps, plate, noise)
+    frames: Iterable[Image] = film.frames
+    if noise > _LOUD:
+        frames = (np.asarray(cv2.GaussianBlur(frame, (0, 0), 1.0), np.uint8) for frame in frames)
+        noise /= 2 * np.sqrt(np.pi)
+    found, lights = candidates(frames, film.maps, plate, noise)
     return uncommon(found, targets), lights
 
 
@@ -254,6 +267,19 @@ def _plainest(seen: Candidates, rows: Ints) -> tuple[int, Floats, Floats]:
     worth = seen.quality[rows] - 0.5 * np.abs(np.log(seen.area[rows] / usual))
     best = rows[np.argmax(worth)]
     return int(seen.frame[best]), seen.centre[best], np.maximum(seen.box[best, 2:], 4)
+
+
+def _pace(seen: Candidates, rows: Ints, frame: int) -> Floats:
+    """By how much a frame a path moves around a frame, (2,)."""
+    near = rows[np.abs(seen.frame[rows] - frame) <= 2]
+    if len(near) < 2:
+        return np.zeros(2)
+    return np.asarray(np.polyfit(seen.frame[near], seen.place[near], 1)[0])
+
+
+def _rivals(paths: Sequence[Motion]) -> Sequence[Motion]:
+    """Paths that are about as plain as the plainest."""
+    return [path for path in paths[1:] if path.rating > 0.5 * paths[0].rating]
 
 
 def _covering(
@@ -363,8 +389,9 @@ def _as_track(
     pixels: Floats, errors: Floats, motion: CameraMotion, doubts: tuple[str, ...]
 ) -> Track:
     """Of pixels (n, 2) of the first frame and their errors (n,), infinite where it is not seen."""
-    maps = motion.maps[: len(pixels)] if motion.moves else None
-    return Track(pixels, _confidence(errors), "motion", doubts, maps)
+    moves = motion.moves
+    maps = motion.maps[: len(pixels)] if moves else None
+    return Track(pixels, _confidence(errors), "motion" if moves else "background", doubts, maps)
 
 
 def _confidence(errors: Floats | float) -> Floats:
@@ -383,14 +410,10 @@ def _doubts(
     film: Film, seen: Candidates, paths: list[Motion], hint: Hint | None
 ) -> tuple[str, ...]:
     """What else moves about as plainly, and whether the camera is known."""
-    doubts: tuple[str, ...] = ()
-    others = [p for p in paths[1:] if p.rating > 0.5 * paths[0].rating]
-    if others and hint is None:
+    doubts = film.doubts
+    if hint is None and (others := _rivals(paths)):
         doubts += (f"something else moves about as plainly, {_spot(film, seen, others[0])}: if "
                    "that is the target, say so, target=Hint(frame=, box=)",)  # fmt: skip
-    if not film.sure:
-        doubts += ("the background is too plain to tell whether the camera moves: if so, its "
-                   "motion is part of the track",)  # fmt: skip
     return doubts
 
 
@@ -415,39 +438,28 @@ def expected(seen: Candidates, rows: Ints, film: Film, n: int) -> Ways:
 
 
 def finished(
-    views: list[View | None], motion: CameraMotion, doubts: tuple[str, ...],
-    apart: Bools | None = None,
-) -> Track:  # fmt: skip
-    """The views of the whole target as a track.
-
-    Where (n,) it is not known to be `apart` from others like it, a view may be of several in one.
-    """
+    views: list[View | None], motion: CameraMotion, doubts: tuple[str, ...]
+) -> tuple[Track, float]:
+    """The views of the whole target as a track, and by how many pixels they may be off at most."""
     n = len(views)
     pixels, errors = np.full((n, 2), np.nan), np.full(n, np.inf)
     whole, of_parts = entire(views)
     at = np.array([i for i, view in enumerate(whole) if view], int)
     if len(at) < _SHORTEST:
-        return nothing(motion, n)
+        return nothing(motion, n), 0.0
     doubts += of_parts
     shown = [view for view in whole if view]
     steady = carry(motion.maps[at], np.array([view.centroid for view in shown]))
     areas = np.array([view.area for view in shown])
     inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])
-    outlines = [carry(motion.maps[i], view.outline) for i, view in zip(at, shown, strict=True)]
-    alone = np.array([view.whole is not None and view.whole.area == view.area for view in shown])
-    if apart is not None:
-        alone &= apart[at]
-    inside &= ~hidden(outlines, steady, areas, alone)
-    faint = np.array([view.faint for view in shown])
-    if faint.mean() < 0.5:  # else it is so everywhere
-        inside &= ~faint
-    good = fitting(at, steady, areas, inside, alone)
+    skewness = np.array([view.skewness for view in shown])
+    good, bound = fitting(at, steady, areas, skewness, inside)
     untold = at[~np.isfinite(motion.errors[at])]
     if len(untold):
         doubts += (f"in {len(untold)} frames of {n} the target is seen, but not how the camera "
                    f"moved, from {untold[0]} to {untold[-1]}: they are left out",)  # fmt: skip
     if good.sum() < max(_SHORTEST, 0.05 * n):
-        return nothing(motion, n)
+        return nothing(motion, n), 0.0
     if (first := swapped(at[good], areas[good])) is not None:
         doubts += (f"from frame {at[good][first]} on, what is followed has another size at once: "
                    "perhaps it is something else",)  # fmt: skip
@@ -460,21 +472,22 @@ def finished(
     if np.median(motion.errors[at[good]]) > LOOSE:
         error = np.median(motion.errors[at[good]])
         doubts += (f"the camera moves, and its motion is known to {error:.1f} px only",)
-    return _as_track(pixels, errors, motion, doubts)
+    return _as_track(pixels, errors, motion, doubts), bound
 
 
 def _filled(
-    found: Track, film: Film, views: list[View | None], looks: Looks, ways: Ways,
+    found: Track, bound: float, film: Film, views: list[View | None], looks: Looks, ways: Ways,
     seed: tuple[int, Floats, Floats] | None,
 ) -> Track:  # fmt: skip
-    """A track with its gaps filled: where its motion leads, or where it is by its looks.
+    """A track with its gaps filled where a part of the target shows, and its motion leads.
 
-    Where only a part of it shows, its motion is surer, if that is known; else the looks, which are
-    off by the same as in the frames around.
+    That must be known as well as whole views are, to a `bound`; where they are known no better, its
+    looks will do, which are off by the same as in the frames around. What somebody points at is
+    wanted in any case.
     """
     n, k = len(found.pixels), film.factor
     pixels, confidence = found.pixels.copy(), found.confidence.copy()
-    rough = 0.5  # confidence in a target that is not seen whole: it is known to about two pixels
+    vague = 2.0  # pixels to which looks tell a place
     alike = carry(film.motion.maps[:n], k * looks.box[:, :2] + (k - 1) / 2)
     side = k * np.sqrt(looks.box[:, 2:].prod(axis=1))
     reach = 0.6 * side + 2
@@ -487,10 +500,7 @@ def _filled(
     good = np.isfinite(pixels[:, 0])
     usual = np.median(looks.fit[good & on]) if (good & on).any() else 0.5
     at = np.flatnonzero(good)
-    told = seed is not None
     for i in np.flatnonzero(~good & np.isfinite(ways.centre[:, 0])).tolist():
-        if not told and not (len(at) and at[0] < i < at[-1]):
-            continue
         size, view = ways.box[i, 2:].mean(), views[i]
         beside = np.concatenate([at[at < i][-4:], at[at > i][:4]])
         if len(beside) == 8 and np.ptp(beside) < 40:
@@ -499,24 +509,26 @@ def _filled(
                 np.polyfit(beside - i, pixels[beside], degree)[-1] for degree in (2, 3, 4)
             )
             off = max(np.linalg.norm(way - other), np.linalg.norm(finer - other))
-            known = off < (0.25 * size if told else min(0.25 * size, 2))
+            known = off < (min(0.25 * size, bound) if seed is None else 0.25 * size)
             there = carry(film.motion.maps[i], view.centroid[None])[0] if view else np.inf
             part = np.linalg.norm(there - way) < 0.75 * size
             like = np.linalg.norm(alike[i] - way) < reach[i]
             if known and (part or (like and looks.fit[i] > 0.5 * usual)):
-                pixels[i], confidence[i] = way, rough
+                pixels[i], confidence[i] = way, _confidence(max(float(off), bound))
                 continue
         near = at[np.argsort(np.abs(at - i), kind="stable")[:15]]
-        if not told and view is not None:  # what hides a part of it draws its looks aside
-            of_usual_size = view.area > np.median([views[k].area for k in near]) / WHOLE
-            if not (view.inside and of_usual_size):
+        if seed is None:
+            if bound < vague or view is None or not (at[0] < i < at[-1]):
+                continue
+            # What hides a part of it draws its looks aside.
+            if not view.inside or view.area < np.median([views[k].area for k in near]) / 1.5:
                 continue
         pointed = seed is not None and i == seed[0]
-        if not pointed and not (on[i] and looks.fit[i] > (0.5 if told else 0.7) * usual):
+        if not pointed and not (on[i] and looks.fit[i] > (0.7 if seed is None else 0.5) * usual):
             continue
         near = near[on[near]]
         shift = np.median((found.pixels - alike)[near], axis=0) if len(near) > 2 else 0
-        pixels[i], confidence[i] = alike[i] + shift, rough
+        pixels[i], confidence[i] = alike[i] + shift, _confidence(vague)
     if not len(at) and np.isfinite(pixels[:, 0]).any():
         return replace(found, pixels=pixels, confidence=confidence, warnings=(_LOOKS_ALONE,))
     return replace(found, pixels=pixels, confidence=confidence)
@@ -546,8 +558,7 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
     check_integer("count", count, least=1)
     frames = Reel(path, LONGEST)
     samples = sample_frames(frames)
-    # Before a plain background, all that could tell of a camera's motion may be the targets.
-    film = Film.of(frames, samples, BackgroundModel(samples).camera_rests)
+    film = Film.of(frames, samples)
     seen, lights = sighted(film, targets=count)
     n = len(lights)
     # Paths of a target that may follow each other.
@@ -555,10 +566,6 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
     lanes, strange = _lanes(seen, paths, count)
     ways = [_joined([expected(seen, p.rows, film, n) for p in lane]) for lane in lanes]
     touching = _touching(ways)
-    # One that is not seen may be in one with any of the others.
-    lost = np.ones((len(lanes), n), bool)
-    for missed, lane in zip(lost, lanes, strict=True):
-        missed[seen.frame[np.concatenate([path.rows for path in lane])]] = False
     longest = max(strange, key=lambda path: len(path.rows), default=None)
     doubts: tuple[str, ...] = ()
     # Share of the frames in which one more thing moves, above which there is doubt.
@@ -567,10 +574,9 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
                   f"{_spot(film, seen, longest)}",)  # fmt: skip
     tracks = []
     lens = lens_of(samples, film, *ways)
-    for way, met, missed in zip(ways, touching, lost, strict=True):
-        apart = np.asarray(lost.sum(axis=0) == missed)
+    for way, met in zip(ways, touching, strict=True):
         way.centre[met] = np.nan
-        tracks.append(finished(viewed(film, lens, way, lights), film.motion, doubts, apart))
+        tracks.append(finished(viewed(film, lens, way, lights), film.motion, doubts)[0])
         doubts = ()
     return (*tracks, *[nothing(film.motion, n)] * (count - len(tracks)))
 

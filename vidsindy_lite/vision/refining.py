@@ -1,14 +1,22 @@
 """From a path of candidates to the target's centroid, to a fraction of a pixel, in whole frames.
 
 Near each place of the path, what differs from the steadied background and has the target's colour
-is taken apart from the rest; its *coverage* of each pixel (see `background`) gives the centroid. A
-view whose size or place does not fit those around it is of a part, of something else, or of both
-in one, and is left out.
+is taken apart from the rest. Where a frame mixes target and background, its colour lies on the line
+between the two, so that the *coverage* of each pixel,
 
-A view of a part of the target looks like one of a smaller target beside its place. But views are
-many, and what hides it stays where it is: where views of the target reach whose middles are near,
-and yet no view ever shows it, it is hidden, by something before it or by a ground of its own
-colour. Views that reach there are of parts.
+::
+
+    alpha = <frame - background, target - background> / |target - background|^2,
+
+is known even along an anti-aliased edge, and the centroid is the mean of the pixel positions
+weighted with it: to a thousandth of a pixel in clean films.
+
+A view may be of a part of the target, of something else, or of both in one. What is missing, or is
+not the target's, is on one side of it: such a view is larger or smaller than those around it, or
+lopsided in another way, as its *skewness* says. Neither changes where motion or a codec blurs the
+outline alike on both sides. Half the size of the target times such a difference is about the pixels
+by which the centroid of the view is off the target's; a view is left out where these are many more
+than those by which the path scatters.
 """
 
 from __future__ import annotations
@@ -19,14 +27,13 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
+from scipy.spatial.distance import cdist
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .background import Plate, dot, hull, least_difference, lengths, relit, shadowed, tolerance
 
-_CELLS = 32  # into which the side of a target is cut
-_REACH = 1.5  # sides of the target from its middle that its usual outline may have
 _UNEVEN = 0.12  # share by which a shadow may darken the colours of a pixel unlike each other
-WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
+_WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
 _AROUND = 9  # views around one that say how large it should be
 _MOSTLY = 0.8  # share of the views that must show it whole
 _JOINED = 2.0  # factor by which the area grows at once where a target meets something like it
@@ -34,91 +41,22 @@ _BESIDE = 5  # views before and after such a meeting, which show how large it wa
 _CORE = np.ones((5, 5), np.uint8)  # a rim of two pixels
 
 
-def hidden(
-    outlines: Sequence[Floats], centres: Floats, areas: Floats, alone: Bools | None = None
-) -> Bools:
-    """Which views (n,) reach where the target is never seen, though others of it reach there, too.
-
-    Parameters
-    ----------
-    outlines : sequence of ndarray, shape (k, 2)
-        Convex outlines of the views, in pixels of the first frame.
-    centres : ndarray, shape (n, 2)
-        Their middles.
-    areas : ndarray, shape (n,)
-    alone : ndarray, shape (n,), optional
-        Which views show nothing but the target: if these are most of them, only they say what the
-        target never covers.
-    """
-    telling = np.ones(len(centres), bool) if alone is None or alone.mean() <= 0.5 else alone
-    sides = np.sqrt(np.maximum(areas, 1))
-    points = np.concatenate(outlines)
-    low = points.min(axis=0) - _REACH * sides.max()
-    extent = np.ptp(points, axis=0) + 2 * _REACH * sides.max()
-    # Cells of the longer side of a chart.
-    cell = max(float(np.median(sides)) / _CELLS, float(extent.max()) / 2000, 1.0)
-    shape = np.ceil(extent[::-1] / cell).astype(int) + 1
-    chart, missed = np.zeros(shape, np.uint8), np.zeros(shape, np.uint16)
-    for outline in outlines:
-        patch, window = _drawn((outline - low) / cell)
-        chart[window] |= patch
-    unseen = np.asarray(cv2.dilate(chart, np.ones((3, 3), np.uint8)) == 0)
-    # Views around one that say how large it would be if it were whole.
-    whole = np.maximum(sides, median_filter(sides, 19))
-    usual = whole[:, None, None] * _usual(outlines, centres, sides)
-    for centre, reach in zip(centres[telling], usual[telling], strict=True):
-        # Of that outline, within which a target is to be seen.
-        patch, window = _drawn((centre + 0.9 * reach - low) / cell)
-        missed[window] += patch & unseen[window]
-    # Views that miss the target in a place where it is hidden.
-    # Their edges are within three cells of it.
-    never = np.asarray(cv2.dilate((missed >= 2).astype(np.uint8), np.ones((7, 7))), np.uint8)
-    found = np.zeros(len(centres), bool)
-    for i, (outline, centre, reach) in enumerate(zip(outlines, centres, usual, strict=True)):
-        for reached in (outline, centre + reach):
-            patch, window = _drawn((reached - low) / cell)
-            found[i] |= bool((patch & never[window]).any())
-    return found
-
-
-def _usual(outlines: Sequence[Floats], centres: Floats, sides: Floats) -> Floats:
-    """The outline (k, 2) within which most views show the target, around its middle, of side 1."""
-    side = int(2 * _REACH * _CELLS) + 1
-    count = np.zeros((side, side), np.uint32)
-    for outline, centre, size in zip(outlines, centres, sides, strict=True):
-        around = np.clip((outline - centre) / size, -_REACH, _REACH)
-        patch, window = _drawn((around + _REACH) * _CELLS)
-        count[window] += patch
-    # Share of the views that show a place of the usual outline.
-    usual = hull(count >= min(0.75 * len(outlines), count.max()))
-    return np.asarray(usual / _CELLS - _REACH, float)
-
-
-def _drawn(outline: Floats) -> tuple[Image, tuple[slice, slice]]:
-    """A convex outline in cells as a patch that is 1 within it, and where the patch lies."""
-    left, top = np.floor(outline.min(axis=0)).astype(int)
-    right, bottom = np.ceil(outline.max(axis=0)).astype(int) + 1
-    patch = np.zeros((bottom - top, right - left), np.uint8)
-    cv2.fillConvexPoly(patch, np.rint(16 * (outline - [left, top])).astype(np.int32), 1, shift=4)
-    return patch, np.s_[top:bottom, left:right]
-
-
 @dataclass(frozen=True)
 class View:
     """One look at the target, in pixels of its frame.
 
-    Centroid (2,), area, mean colour, is it clear of the image's border?, convex outline (k, 2);
-    `whole` is the view of it with all that has another colour in one piece with it, if compact. The
-    area is 0 where nothing has the target's colour. It is `faint` before ground like itself.
+    Centroid (2,), area, mean colour, is it clear of the image's border?, skewness (2,), see
+    `_skewness`, NaN before ground of its own colour; `whole` is the view of it with all that has
+    another colour in one piece with it, if compact. The area is 0 where nothing has the target's
+    colour.
     """
 
     centroid: Floats
     area: float
     colour: Floats
     inside: bool
-    outline: Floats
+    skewness: Floats
     whole: View | None = None
-    faint: bool = False
 
 
 class Lens:
@@ -168,7 +106,7 @@ class Lens:
         part = label is not None
         if label is None and (label := _nearest(mask, centre - low)) is None:
             return None
-        view = self._measure(label, change, contrast, low, bound, now)
+        view = self._measure(label, change, contrast, low, now)
         found = whole(label, mask, mask & (off | (share < 0)), now, ground)
         if found is None:
             return view if part else None
@@ -178,16 +116,14 @@ class Lens:
         first, end = _extent(label, low)
         if (((first == low) & (low > 0)) | ((end == high) & (high < self.plate.size))).any():
             return view if part else None  # how far it goes, the window does not show
-        all_ = self._measure(label, change, colours - ground, low, bound, now)
+        all_ = self._measure(label, change, colours - ground, low, now)
         return replace(view if part else replace(all_, area=0.0), whole=all_)
 
     def _measure(
-        self, label: Bools, change: Floats32, contrast: Floats32, low: Floats, bound: Floats32,
-        now: Floats32,
-    ) -> View:  # fmt: skip
-        """Centroid and area of one connected part; `bound` tells what differs from the ground."""
+        self, label: Bools, change: Floats32, contrast: Floats32, low: Floats, now: Floats32
+    ) -> View:
+        """Centroid, area and skewness of one connected part."""
         near = cv2.dilate(label.astype(np.uint8), _CORE) > 0
-        rim = near & ~label
         core = cv2.erode(label.astype(np.uint8), _CORE) > 0
         square = dot(contrast, contrast)
         alpha = dot(change, contrast) / np.maximum(square, self.least**2)
@@ -200,12 +136,25 @@ class Lens:
         centroid = np.array([alpha.sum(axis=0) @ u, alpha.sum(axis=1) @ v]) / max(area, 1e-9)
         first, end = _extent(label, low)
         inside = bool((first > 0).all() and (end < self.plate.size).all())
-        # Nearly all of the ground around it differs from it by less than two tolerances.
-        alike = square[rim] < (2 * bound[rim]) ** 2
-        faint = bool(alike.any() and alike.mean() > 0.9)
+        # Share of the ground around it that does not show where it ends.
+        blind = (square[near & ~label] < self.least**2).mean() > 0.1
+        beside = u - centroid[0], v - centroid[1]
+        skewness = np.full(2, np.nan) if blind else _skewness(alpha, *beside)
         shade = now[core if core.any() else label].mean(axis=0)
-        outline = low + hull(label).astype(float)
-        return View(low + centroid, area, shade, inside, outline, faint=faint)
+        return View(low + centroid, area, shade, inside, skewness)
+
+
+def _skewness(alpha: Floats, u: Floats, v: Floats) -> Floats:
+    """How lopsided a coverage is about its centroid: two numbers that no turn or size changes.
+
+    With z = u + iv from the centroid a turn changes only the phase of the complex moments
+    c_pq = sum of alpha z^p conj(z)^q. Of third order, these are magnitudes of c_21 and c_30.
+    """
+    m = np.vander(v, 4, increasing=True).T @ alpha @ np.vander(u, 4, increasing=True)
+    c21 = m[0, 3] + m[2, 1] + 1j * (m[1, 2] + m[3, 0])
+    c30 = m[0, 3] - 3 * m[2, 1] + 1j * (3 * m[1, 2] - m[3, 0])
+    # By the second moment of a disc of that area, as a skewness is by that of a distribution.
+    return np.abs([c21, c30]) * (2 * np.pi) ** 1.5 / max(m[0, 0], 1e-9) ** 2.5
 
 
 def _extent(label: Bools, low: Floats) -> tuple[Floats, Floats]:
@@ -252,7 +201,7 @@ def entire(views: Sequence[View | None]) -> tuple[list[View | None], tuple[str, 
     if not turns or np.median(areas[:, 0] / areas[:, 1]) > 0.9:
         return parts, ()
     size = np.log(areas[:, 1])
-    keeps = np.abs(size - median_filter(size, _AROUND)) < np.log(WHOLE)
+    keeps = np.abs(size - median_filter(size, _AROUND)) < np.log(_WHOLE)
     if keeps.mean() > _MOSTLY:
         return [one and (one.whole or one) for one in views], ()
     return parts, ("the target has several colours, or touches other things: perhaps only a part "
@@ -279,61 +228,70 @@ def _usual_ones(views: Sequence[View | None]) -> list[View | None]:
     return [one if one and one.area > 0 else None for one in best]
 
 
-def fitting(
-    frames: Floats, places: Floats, areas: Floats, inside: Bools, alone: Bools | None = None
-) -> Bools:
-    """Which views (n,) are of the whole target, on its way: by their sizes and places (n, 2).
+def displaced(
+    frames: Ints, places: Floats, areas: Floats, skewness: Floats, inside: Bools
+) -> tuple[Floats, float]:
+    """Pixels by which views (n,) are off the target, as their outlines say, and a bound to them.
 
-    If most of them show it `alone`, these say how large it is and where its motion leads, and the
-    others, which may be wrong by the same, must be there.
+    The usual skewness is the commonest one: whole views, at least a quarter of all, lie close
+    around it; of a view without any only the area counts. The usual area is that of the views
+    around. By no more than the bound whole views may seem to be off: that is how their outlines
+    differ, and how their path scatters.
     """
-    inside = inside & ~joined(areas)
-    good, telling = inside, np.ones(len(frames), bool)
-    if alone is not None and 2 * alone[inside].sum() > inside.sum():
-        telling = alone
-    logs = np.log(np.maximum(areas, 1e-3))
-    for _ in range(2):
-        use = np.flatnonzero(good & telling)
-        if len(use) < 3:
-            return good & telling
-        usual = np.interp(frames, frames[use], median_filter(logs[use], _AROUND, mode="mirror"))
-        good = inside & (np.abs(logs - usual) < np.log(WHOLE))
-    # Of its size, by which a view may be off the way.
-    room = np.where(telling, 0.3 * np.sqrt(areas), 0)
+    if not inside.any():
+        return np.full(len(areas), np.inf), 0.0
+    half, logs = np.sqrt(np.median(areas[inside])) / 2, np.log(np.maximum(areas, 1e-3))
+    sound, quarter = inside & np.isfinite(skewness[:, 0]), inside.sum() // 4
+    off, alike = np.zeros(len(areas)), 0.0
+    if sound.sum() <= quarter:
+        sound = inside
+    else:
+        some = skewness[sound][:: 1 + sound.sum() // 200]
+        apart = cdist(some, skewness[sound])
+        commonest = np.partition(apart, quarter, axis=1)[:, quarter].argmin()
+        off[sound] = half * apart[commonest]
+        alike = float(np.partition(off[sound], quarter)[quarter])
+
+    def bound() -> float:
+        best = sound & (off <= np.quantile(off[sound], 0.75))
+        rough, torn = (scatter(frames[best], x[best]) for x in (places, half * logs[:, None]))
+        return max(0.5, 6 * alike, 12 * rough, 4 * torn) if np.isfinite(rough) else 0.5
+
+    use = np.flatnonzero(sound & (off < bound()))
+    if len(use) >= _AROUND:
+        off = np.maximum(off, half * np.abs(logs - _trend(frames, frames[use], logs[use])))
+    off[~inside] = np.inf
+    return off, bound()
+
+
+def _trend(frames: Ints, at: Ints, values: Floats) -> Floats:
+    """What the values around each frame say of it: the line of Theil and Sen through nine."""
+    first = np.clip(np.searchsorted(at, frames) - _AROUND // 2, 0, len(at) - _AROUND)
+    around = first[:, None] + np.arange(_AROUND)
+    t, y = at[around] - frames[:, None], values[around]
+    i, j = np.triu_indices(_AROUND, 1)
+    slope = np.median((y[:, j] - y[:, i]) / (t[:, j] - t[:, i]), axis=1)
+    return np.asarray(np.median(y - slope[:, None] * t, axis=1))
+
+
+def fitting(
+    frames: Ints, places: Floats, areas: Floats, skewness: Floats, inside: Bools
+) -> tuple[Bools, float]:
+    """Which views (n,) are of the whole target, on its way; by so many pixels they may be off."""
+    off, bound = displaced(frames, places, areas, skewness, inside)
+    good = off < bound
     while (use := np.flatnonzero(good)).size >= 7:
-        known = np.flatnonzero(good & telling)
-        told = [_leave_out(frames, places, i, known) for i in use.tolist()]
-        off, unsure = np.array(told).T
-        usual = max(float(np.median(off)), 0.05)
-        bound = np.maximum(10 * usual, 1 + room[use])
-        over = off / (bound + unsure)
-        for k in np.flatnonzero(~telling[use]):  # these must fit each other, and not stand alone
-            off, unsure = _leave_out(frames, places, int(use[k]), use)
-            over[k] = max(over[k], off / (bound[k] + unsure)) if np.isfinite(unsure) else np.inf
+        told = [_leave_out(frames, places, i, use) for i in use.tolist()]
+        miss, unsure = np.array(told).T
+        # Of its size, by which a view may be off the way.
+        room = np.maximum(10 * max(float(np.median(miss)), 0.05), 1 + 0.3 * np.sqrt(areas[use]))
+        over = miss / (room + unsure)
         # A wrong place spoils what its neighbours seem to be: the worst of them goes first.
         worst = (over > 1) & (over == maximum_filter1d(over, 7))
         if not worst.any():
             break
         good[use[worst]] = False
-    return good
-
-
-def joined(areas: Floats) -> Bools:
-    """Which views (n,), of these areas, are of the target and of something like it in one.
-
-    Where the two meet the area grows at once, and it shrinks at once where they part. What was
-    hidden before and after was so for a few views only.
-    """
-    step = np.diff(np.log(np.maximum(areas, 1e-3)))
-    parts = np.flatnonzero(step < -np.log(_JOINED))
-    found = np.zeros(len(areas), bool)
-    for meets in np.flatnonzero(step > np.log(_JOINED)):
-        first, last = meets + 1, min(parts[parts > meets], default=len(areas))
-        before, after = areas[max(first - _BESIDE, 0) : first], areas[last + 1 :][:_BESIDE]
-        if min(len(before), len(after)) == _BESIDE:
-            usual = max(np.median(before), np.median(after))
-            found[first : last + 1] = np.median(areas[first : last + 1]) > WHOLE * usual
-    return found
+    return good, bound
 
 
 def swapped(frames: Ints, areas: Floats) -> int | None:
@@ -342,7 +300,7 @@ def swapped(frames: Ints, areas: Floats) -> int | None:
     No target changes like that within a few frames and remains so.
     """
     logs = np.log2(np.maximum(areas, 1e-3)) / np.log2(_JOINED)
-    most = np.maximum(np.diff(frames) / _BESIDE, 1)
+    most = np.maximum(np.diff(frames) / _AROUND, 1)
     for first in 1 + np.flatnonzero(np.abs(np.diff(logs)) > most):
         before, after = logs[:first][-_BESIDE:], logs[first:][:_BESIDE]
         apart = abs(np.median(after) - np.median(before))

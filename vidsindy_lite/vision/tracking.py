@@ -1,11 +1,10 @@
 """Where the moving target is in each frame of a video file, to a fraction of a pixel.
 
-Three ways to find it stand behind one call. A *background model* (`background`) knows all frames
-and finds what differs from what is at rest: to 1/100 of a pixel, as long as camera and background
-stay as they are. Where they do not, `moving` takes out the camera's motion and the light's, and
-follows what moves most plainly of all that does. A *detector* knows what targets look like and
-finds it in each frame on its own, whatever the background does, to a few tenths of a pixel; what it
-sees in the single frames is linked to one motion.
+Two ways to find it stand behind one call. The film tracker (`moving`) knows all frames: it takes
+out the camera's motion and the light's, and of all that differs from the ground it follows what
+moves most plainly: to a thousandth of a pixel in clean films of a camera at rest. A *detector*
+knows what targets look like and finds it in each frame on its own, whatever the background does, to
+a few tenths of a pixel; what it sees in the single frames is linked to one motion.
 
 The paper tracks with a detector, YOLO-v8. Its vendor's code and weights cannot be part of this
 package, so here is a small network of the same family, written and trained from scratch (see
@@ -30,11 +29,9 @@ import numpy as np
 
 from ..arrays import Floats, Floats32, Image
 from ..checks import MALFORMED, check_instance, check_path, shown
-from .background import LONGEST, BackgroundModel, sample_frames, whole_blobs
 from .candidates import Candidates, Hint, as_written, best_path
 from .moving import Track, follow
-from .refining import scatter
-from .video import Reel, read_video, video_info
+from .video import read_video, video_info
 
 DETECTORS = ("auto", "background", "learned")
 WEIGHTS = Path(__file__).with_name("detector.pt")
@@ -61,15 +58,11 @@ def track(
         A video of a target that moves. Other things may move, too, and the camera may tremble or
         be held in the hand.
     detector : {"auto", "background", "learned"} or path
-        * "auto": "background" as long as camera, light and background are at rest, and the target
-          is of one colour. Else the
-          camera's motion and the light's are taken out, and of all that moves the plainest path is
-          followed: something that travels, keeps its colour and turns gently. Gaps of a few
-          frames in which a part of it shows are filled where its motion leads.
-        * "background": for a camera at rest, the most exact. The target may turn and change its
-          size, not its shape, and is whole in at least a quarter of the frames that show any of
-          it. It must stay away from each place for at least a fifth of the frames: what never
-          moves away by about its own width is background here, not for "auto".
+        * "auto": the camera's motion and the light's are taken out, and of all that moves the
+          plainest path is followed: something that travels, keeps its colour and turns gently.
+          The target may turn and change its size slowly; views of a part of it are left out. Gaps
+          of a few frames in which a part of it shows are filled where its motion leads.
+        * "background": the same for a camera that is known to be at rest.
         * "learned": the package's own network, for backgrounds that move or change.
         * the name of a YOLO-v8 model exported to ONNX (see `OnnxDetector`).
     target : Hint, optional
@@ -79,8 +72,8 @@ def track(
     Returns
     -------
     Track
-        Its warnings say where something else might be the target, and whether it misses a hint; of
-        "background", whether the camera or the background is not at rest.
+        Its warnings say where something else might be the target, whether it misses a hint, and
+        whether the camera may move other than is known.
 
     Raises
     ------
@@ -105,27 +98,9 @@ def track(
 
 def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | None) -> Track:
     """The track, its doubts without the name of the file."""
-    if detector not in ("auto", "background"):
-        return _link_detections(path, detector)
-    frames = Reel(path, LONGEST)
-    samples = sample_frames(frames)
-    model = BackgroundModel(samples)
-    if detector == "auto" and model.unrest:
-        del model  # its images are large
-        return follow(frames, samples, target)
-    model.learn_target(samples)
-    if detector == "auto" and model.several_colours:
-        return follow(frames, samples, target)
-    pixels, confidence, blurred = whole_blobs(model, frames.whole)
-    found = Track(pixels, confidence, "background")
-    if detector == "auto" and (blurred or not _plausible(found, target)):
-        return follow(frames, samples, target)
-    found = replace(found, warnings=model.unrest)
-    if detector == "auto" and _seen(found) < 0.75 and model.shows_target():
-        other = follow(frames, samples, target)
-        sees_more = _seen(other) > _seen(found) + 0.1
-        return other if sees_more and not other.warnings else found
-    return found
+    if detector in ("auto", "background"):
+        return follow(path, target, rests=detector == "background")
+    return _link_detections(path, detector)
 
 
 def _seen(found: Track) -> float:
@@ -141,21 +116,6 @@ def _lost(found: Track) -> tuple[str, ...]:
         return ()
     lost = between - len(at)
     return (f"the target is lost in {lost} of {between} frames, from {at[0]} to {at[-1]}",)
-
-
-def _plausible(found: Track, hint: Hint | None) -> bool:
-    """Is it a smooth motion, and that of what the hint says?"""
-    at = np.flatnonzero(np.isfinite(found.pixels[:, 0]))
-    if not len(at):
-        return False
-    if hint is None:
-        rough = scatter(at, found.pixels[at])
-        # Pixels that a track may scatter about a smooth motion.
-        return not np.isfinite(rough) or rough < 1.0
-    if hint.box is None or hint.frame not in at:
-        return False
-    middle = np.array(hint.box[:2]) + (np.array(hint.box[2:]) - 1) / 2
-    return bool((np.abs(found.pixels[hint.frame] - middle) <= np.array(hint.box[2:]) / 2).all())
 
 
 def check_detector(name: str | os.PathLike) -> None:
@@ -207,7 +167,7 @@ def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
         row[13] = d.confidence
     seen = Candidates.of(np.array([i for i, _ in flat], int), np.eye(3), rows)
     chain: list[Detection | None] = [None] * len(sightings)
-    for row in best_path(seen, len(sightings))[0]:
+    for row in best_path(seen, away=True)[0]:
         chain[flat[row][0]] = flat[row][1]
     return chain
 
