@@ -74,16 +74,15 @@ def _epipolar(tracks: Sequence[Floats], cameras: Sequence[Camera], i: int) -> Eq
     others = [j for j, known in enumerate(cameras) if known.is_calibrated and j != i]
     loose = [j for j in others if not cameras[j].is_placed]
     free = [not camera.is_calibrated] * 2 + [not camera.is_placed] * 2 + [True] * len(loose)
-    values = np.append(camera.scaled_turn, np.zeros(2 + len(loose)))
     parts = [(np.zeros((0, len(free))), np.zeros(0), np.zeros(0, int))]
     for j in others:
-        lines = epipolar_lines(cameras[j].somewhere, tracks[j], camera.somewhere)
+        lines = epipolar_lines(cameras[j], tracks[j], camera)
         design, target = epipolar_rows(lines, camera, tracks[i])
         constants = np.tile(np.equal(loose, j), (len(design), 1))
         moves = np.hstack((lines[0][:, ::-1] * [-1, 1], constants))
         design = np.hstack((design, camera.image_size[0] / 2 * moves))
         told = np.flatnonzero(np.isfinite(design).all(axis=1) & np.isfinite(target))
-        parts.append((design[told], (target - design @ values)[told], told))
+        parts.append((design[told], target[told], told))
     design, target, frames = map(np.concatenate, zip(*parts, strict=True))
     return Equations(design[:, free], target, frames)
 

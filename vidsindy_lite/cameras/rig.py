@@ -199,7 +199,7 @@ class Rig:
 
     def _check_measured(self) -> None:
         """That of perspective cameras all have a place, or none; a distance is for the latter."""
-        loose = [not isinstance(c, OrthographicCamera) and not c.is_placed for c in self.cameras]
+        loose = [not camera.is_measured for camera in self.cameras]
         if any(loose) and not all(loose):
             raise ValueError(
                 "cameras: must all have a position, or none if all are perspective, got none of "
@@ -221,7 +221,7 @@ class Rig:
     @property
     def is_measured(self) -> bool:
         """Whether something is known of where the cameras stand, or where they look."""
-        return any(isinstance(c, OrthographicCamera) or c.is_placed for c in self.cameras)
+        return any(camera.is_measured for camera in self.cameras)
 
     @classmethod
     def around(cls, x: ArrayLike, image_size: tuple[int, int] = (512, 512)) -> Rig:
@@ -330,7 +330,7 @@ class Rig:
         for camera in self.cameras:
             lines += ["", "[[camera]]"]
             # repr of a float is its shortest exact decimal form, and valid TOML.
-            lines += [f"{key} = {value!r}" for key, value in _to_table(camera).items()]
+            lines += [f"{key} = {value!r}" for key, value in camera.table.items()]
         return "\n".join(lines) + "\n"
 
     def uncalibrated(self, keep: int = 0) -> Rig:
@@ -553,19 +553,6 @@ def _by_hand(table: dict[str, Any], model: str) -> dict[str, Any]:
 def decimals(values: Floats) -> str:
     """Three decimals of each number."""
     return ", ".join(f"{value:.3f}" for value in values)
-
-
-def _to_table(camera: Camera) -> dict[str, object]:
-    """A camera as plain numbers under the keys of the file; defaults are left out."""
-    known = {} if type(camera) is OrthographicCamera else {"model": camera.model}
-    for part in fields(camera):
-        value = getattr(camera, part.name)
-        default = isinstance(value, float) and value == part.default
-        if value is not None and not default:
-            known[part.name] = value
-    if not isinstance(camera, OrthographicCamera) and not camera.is_placed:
-        known = {key: value for key, value in known.items() if key not in ("normal", "angle")}
-    return {key: np.asarray(value).tolist() for key, value in known.items()}
 
 
 def _from_table(index: int, table: object) -> Camera:

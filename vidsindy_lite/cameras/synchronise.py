@@ -99,14 +99,13 @@ def lag_misses(
             continue
         margin = OVERLAP * min(ends[known], ends[other])
         lags = np.arange(np.ceil(margin - ends[other]), ends[known] - margin + 1)
-        first, second = cameras[known], cameras[other]
-        lines = epipolar_lines(first.somewhere, curves[known].at(frames), second.somewhere)
+        lines = epipolar_lines(cameras[known], curves[known].at(frames), cameras[other])
         instants, rate = frames / footage.rates[known], footage.rates[other]
         missed = []
         # So many pairs of a lag and an instant at a time.
         for block in np.array_split(lags, int(np.ceil(lags.size * frames.size / 200_000))):
             theirs = curves[other].at((instants - block[:, None]) * rate)
-            missed.append(pair_missed(second, lines, theirs))
+            missed.append(pair_missed(cameras[other], lines, theirs))
         yield lags, np.concatenate(missed)
 
 
@@ -116,7 +115,6 @@ def pair_missed(other: Camera, lines: tuple[Floats, Floats], theirs: Floats) -> 
     Its image may be shifted. One instant in ten is left out. Infinite where too few are left.
     """
     design, target = epipolar_rows(lines, other, theirs)
-    target = target - design @ other.scaled_turn
     shift = np.broadcast_to(lines[0], design.shape)
     design = shift if other.is_calibrated else np.concatenate((design, shift), axis=-1)
     seen = np.isfinite(target) & np.isfinite(design).all(axis=-1)
@@ -679,8 +677,7 @@ def _jumped(none: Mistake, given: Mistake, fit: Adjustment) -> tuple[float, Floa
             if j != i:
                 lines = epipolar_lines(camera, curve.track[::stride], other)
                 theirs = curves[j].at((instants - lags[j]) * rates[j])
-                design, target = epipolar_rows(lines, other, theirs)
-                missed[j] = (target - design @ other.scaled_turn) / other.calibration[0]
+                missed[j] = epipolar_rows(lines, other, theirs)[1] / other.calibration[0]
         seen, costs = np.isfinite(missed), np.log1p((missed / DISAGREEMENT) ** 2)
         cost = np.nansum(costs, axis=0) / np.maximum(seen.sum(axis=0), 1)
         # What nobody saw costs as much as what was seen: no lag is better for leaving frames out.
