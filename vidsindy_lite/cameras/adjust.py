@@ -355,12 +355,18 @@ class Adjustment:
         return root * np.nan_to_num(self.misses), root[..., None] * self.reduced.slopes
 
     @property
-    def system(self) -> tuple[Floats, Floats]:
-        """Linear equations for a step, of residuals and measurements in units of their errors."""
+    def system(self) -> tuple[Floats, Floats, Floats]:
+        """Linear equations for a step, of residuals and measurements in units of their errors.
+
+        Their columns have length one; the sizes are what they are to be divided by.
+        """
         (missed, slopes), prior = self.weighed, np.sqrt(self.prior)
         sigma = max(self.noise, _PRIOR_NOISE)
         rows = np.vstack((slopes.reshape(-1, len(prior)) / sigma, np.diag(prior)))
-        return rows, -np.append(missed.ravel() / sigma, prior * self.change[self.free])
+        size = np.linalg.norm(rows, axis=0)
+        size[size == 0] = 1.0
+        target = -np.append(missed.ravel() / sigma, prior * self.change[self.free])
+        return rows / size, target, size
 
     @property
     def factor(self) -> Floats:
@@ -434,11 +440,10 @@ def _downhill(state: Adjustment) -> tuple[Adjustment | None, float]:
     """The state after a step that lessens the errors, and how far it moved images, pixels."""
     free, prior, reduced = state.free, np.sqrt(state.prior), state.reduced
     weights, sigma = state.weights, max(state.noise, _PRIOR_NOISE)
-    rows, target = state.system
-    size = _sizes(rows)
+    rows, target, size = state.system
     if not np.isfinite(size).all():
         return None, np.inf
-    factor, triangle = np.linalg.qr(rows / size)
+    factor, triangle = np.linalg.qr(rows)
     aim = np.append(factor.T @ target, np.zeros(len(size)))
     lags = np.argwhere(free)[:, 1] == LAG
     seen = np.isfinite(state.misses)
@@ -577,19 +582,12 @@ def _causes(near: Adjustment) -> list[Cause]:
     return found
 
 
-def _sizes(rows: Floats) -> Floats:
-    """Lengths of columns, one where they are zero."""
-    size = np.linalg.norm(rows, axis=0)
-    return np.where(size == 0, 1.0, size)
-
-
 def _evidence(near: Adjustment, free: Bools, wanted: Bools) -> tuple[float, float]:
     """T over what chance may make it, zero if it would not matter; pixels that it explains."""
     told, own = free | wanted, (wanted & ~free)[free | wanted]
-    (rows, target), (missed, slopes) = near.system, near.weighed
-    rows, slopes = rows[:, told], slopes[..., told]
-    size = _sizes(rows)
-    step = np.linalg.lstsq(rows / size, target, rcond=1e-10)[0]
+    (rows, target, size), (missed, slopes) = near.system, near.weighed
+    rows, size, slopes = rows[:, told], size[told], slopes[..., told]
+    step = np.linalg.lstsq(rows, target, rcond=1e-10)[0]
     left = missed + slopes @ (step / size)
     share = float(np.linalg.norm(left)) / max(float(np.linalg.norm(missed)), 1e-300)
     factor = fitted_factor(left, slopes, near.prior[told], share * near.noise) * size[:, None]

@@ -240,8 +240,6 @@ def learn_cameras_eq4(tracks: Sequence[Floats], rig: Rig) -> Rig:
         See `learn_cameras`.
     """
     check_learnable(rig)
-    if not rig.is_measured:
-        raise ValueError("rig: Eq. (4) needs all positions, got none; use learn_cameras")
     views, cameras = np.stack(check_views(tracks, rig)), rig.cameras
     known, unknown = ([i for i, c in enumerate(cameras) if c.is_calibrated == k] for k in (1, 0))
     loose = [i for i, camera in enumerate(cameras) if not camera.is_placed]

@@ -219,6 +219,11 @@ class Footage:
         return cls(curves, ticks[0], shifts, speeds)
 
     @property
+    def tracks(self) -> tuple[Floats, ...]:
+        """Of each video, frame by frame."""
+        return tuple(curve.track for curve in self.curves)
+
+    @property
     def clocks(self) -> tuple[Floats, ...]:
         """When each frame of each video was taken, see `align`."""
         return tuple(curve.clock for curve in self.curves)

@@ -760,13 +760,9 @@ class PerspectiveCamera(Camera):
         stretch = (along - across) / np.where(squared > 0, squared, 1)
         shapes = across[:, None, None] * np.eye(2) + stretch[:, None, None] * outer
         centres = out * (depth**2 / clear)[:, None]
-        return self.seen(centres), self._slope(centres) @ shapes @ np.diag(_DOWN)
-
-    def _slope(self, centred: Floats) -> Floats:
-        """Slope of `seen`, (n, 2, 2): what the lens makes of small shapes."""
-        steps = np.eye(2)  # pixels
-        ends = [(self.seen(centred + e) - self.seen(centred - e)) / 2 for e in steps]
-        return np.stack(ends, axis=-1)
+        # What the lens makes of small shapes, by steps of a pixel.
+        ends = [(self.seen(centres + e) - self.seen(centres - e)) / 2 for e in np.eye(2)]
+        return self.seen(centres), np.stack(ends, axis=-1) @ shapes @ np.diag(_DOWN)
 
 
 MODELS: dict[str, Any] = {
@@ -843,8 +839,6 @@ def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floa
     left, right = _stacked(*_lines(matrices, scales, seen), visible)
     crossing = (np.linalg.svd(left, compute_uv=False) > PARALLEL).sum(axis=1) == 3
     x, ended = np.full((len(crossing), 3), np.nan), np.ones(len(crossing), bool)
-    if not crossing.any():
-        return x, ended
     seen, visible = seen[crossing], visible[crossing]
 
     def look(point: Floats, frames: Ints) -> tuple[Floats, Floats]:

@@ -37,9 +37,9 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import rq
 from scipy.spatial.transform import Rotation
 
 from ..arrays import Floats
@@ -650,10 +650,8 @@ def _cameras(
     content: Any, size: tuple[int, int] | None, warnings: list[str]
 ) -> Iterator[tuple[PerspectiveCamera, float]]:
     """The cameras of a file, each with the skew of its pixels."""
-    if isinstance(content, np.ndarray):
-        yield from _from_matrices(check_array("array", content), _size_of({}, size))
-        return
-    for name, table in _tables(content, "", warnings):
+    alone = isinstance(content, np.ndarray)
+    for name, table in [("", {"P": content})] if alone else _tables(content, "", warnings):
         try:
             if "K" in table:
                 yield _from_opencv(table, size), 0.0
@@ -765,13 +763,11 @@ def _from_matrices(
 
 def _from_projection(matrix: Floats, size: tuple[int, int]) -> tuple[PerspectiveCamera, float]:
     """The camera of a projection matrix with a positive determinant, and its skew."""
-    left = matrix[:, :3]
-    if not np.linalg.cond(left) < 1e12:
+    if not np.linalg.cond(matrix[:, :3]) < 1e12:
         raise ValueError("P: must be of a camera at a finite place, got a singular matrix")
-    inner, rotation = rq(left)
-    signs = np.diag(np.sign(np.diag(inner)))
-    inner, rotation = inner @ signs, signs @ rotation
-    shift = np.linalg.solve(inner, matrix[:, 3])
+    parts = cv2.decomposeProjectionMatrix(matrix)[:3]
+    inner, rotation, place = (np.asarray(part, float) for part in parts)
+    shift = -rotation @ place[:3, 0] / place[3]
     inner = inner / inner[2, 2]
     skew = abs(inner[0, 1] / inner[1, 1]) * size[1] / 2
     if skew > _SKEWED:

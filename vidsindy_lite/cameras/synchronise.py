@@ -48,7 +48,6 @@ from .calibrate import check_learnable, closed_form
 from .clocks import (
     INSTANTS,
     OVERLAP,
-    Curve,
     Footage,
     Lags,
     align,
@@ -257,9 +256,9 @@ def learn_lags(
     given = check_rates(rates, len(tracks))
     rig = posed(align(tracks, first, given, clocks), rig, synchronous=False)
     with bar(progress, "synchronise", unit="fit") as shown:
-        videos = _Videos.of(tracks, rig, given, clocks, shown)
-        found = _learned(videos, first)
-    return found if clocks is None else replace(found, clocks=videos.given.clocks)
+        footage = Footage.of(tracks, None, given, check_clocks(clocks, tracks))
+        found = _learned(_Videos.of(footage, rig, shown), first)
+    return found if clocks is None else replace(found, clocks=footage.clocks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,19 +270,11 @@ class _Videos:
     shown: tqdm | None = None
 
     @classmethod
-    def of(
-        cls,
-        tracks: Sequence[Floats],
-        rig: Rig,
-        rates: Floats,
-        clocks: Sequence[ArrayLike] | None,
-        shown: tqdm | None = None,
-    ) -> _Videos:
-        """Of tracks as they are given."""
-        still = at_once(rig.cameras, tracks)
+    def of(cls, given: Footage, rig: Rig, shown: tqdm | None = None) -> _Videos:
+        """Of footage as it is given, with its shutters."""
+        still = at_once(rig.cameras, given.tracks)
         instant = tuple(replace(camera, readout=0.0) for camera in rig.cameras)
-        footage = Footage.of(still, None, rates, check_clocks(clocks, tracks))
-        return cls(footage, instant, shown)
+        return cls(Footage.of(still, None, given.rates, given.clocks), instant, shown)
 
     def footage(self, lags: Floats, rough: bool = False) -> Footage:
         """All instants, or some."""
@@ -292,11 +283,8 @@ class _Videos:
 
     def cameras(self, footage: Footage) -> tuple[Camera, ...] | None:
         """Those that the closed form finds; None if it finds none."""
-        tracks = footage.aligned
-        if not all(np.isfinite(track).any() for track in tracks):
-            return None
         try:
-            return closed_form(tracks, self.known, checked=False)
+            return closed_form(footage.aligned, self.known, checked=False)
         except ValueError:
             return None
 
@@ -484,12 +472,10 @@ def _blurred(i: int, lags: Floats) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Mistake:
-    """What may have been done to the tracks, and what they are without it."""
+    """What may have been done to the footage, and what it is without that."""
 
     what: str
-    tracks: tuple[Floats, ...]
-    rates: Floats
-    clocks: tuple[Floats, ...]
+    footage: Footage
     lags: Lags = Lags(np.zeros(0), np.zeros(0), np.zeros(0), np.inf)
     before: float = np.inf
     alike: tuple[str, ...] = ()
@@ -506,14 +492,13 @@ class Mistake:
 
     def paired(self, cameras: Sequence[Camera]) -> tuple[float, Floats]:
         """By how much two views disagree at their best lags, all pairs; and these lags."""
-        footage = Footage.of(self.tracks, None, self.rates, self.clocks)
-        each = [*lag_misses(footage, cameras, _INSTANTS)]
+        each = [*lag_misses(self.footage, cameras, _INSTANTS)]
         lags = np.array([tried[left.argmin()] for tried, left in each])
         return float(np.linalg.norm([left.min() for _, left in each])), lags - lags[0]
 
     def fits(self, rig: Rig, *lags: Floats) -> list[Adjustment]:
         """Cameras and lags near these, roughly."""
-        videos = _Videos.of(self.tracks, rig, self.rates, self.clocks)
+        videos = _Videos.of(self.footage, rig)
         found = [videos.fitted(each, rough=True) for each in np.unique(lags, axis=0)]
         return [fit for fit in found if fit]
 
@@ -539,7 +524,8 @@ def find_mistake(
     names : sequence of str
         What the videos are called.
     """
-    none = Mistake("", tuple(tracks), rates, check_clocks(clocks, tracks))
+    given = Footage.of(tracks, None, rates, check_clocks(clocks, tracks))
+    none = Mistake("", given)
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
         begun = none.near(rig, start)
         left = min(map(_worst, begun), default=np.inf)
@@ -553,7 +539,7 @@ def find_mistake(
                 break
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
             # none.
-            each = {one.what: one for one in kind(none, rig, names)}.values()
+            each = {one.what: one for one in kind(given, rig, names)}.values()
             ranked = [(*one.paired(rig.cameras), one) for one in each]
             ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
             tried = [
@@ -565,8 +551,8 @@ def find_mistake(
                 # Times by which it has to mend the disagreement of all views together.
                 if now > GROSS or 3.0 * now >= left:
                     break
-                lags = fit.footage.lags
-                told = learn_lags(one.tracks, rig, one.rates, lags, one.clocks)
+                mended, lags = one.footage, fit.footage.lags
+                told = learn_lags(mended.tracks, rig, mended.rates, lags, mended.clocks)
                 if told.agree and told.residual <= 2 * DISAGREEMENT:
                     others = [o.what for n, _, o in tried if n <= ALIKE * max(now, FINE)]
                     alike = tuple(dict.fromkeys(o for o in others if o != one.what))
@@ -583,16 +569,16 @@ def _worst(fit: Adjustment) -> float:
     return max(trimmed(view, 0.5) for view in views)
 
 
-def _views(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
+def _views(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
     """All that change whole views: their order, and their axes."""
     count, sizes = len(names), [camera.image_size for camera in rig.cameras]
     for moved, order in _orders(count):
         if len({sizes[i] for i in moved}) == 1:
-            tracks, clocks = (tuple(one[i] for i in order) for one in (none.tracks, none.clocks))
-            rates = none.rates[order] / none.rates[order[0]]
+            tracks, clocks = ([one[i] for i in order] for one in (given.tracks, given.clocks))
+            rates = given.rates[order] / given.rates[order[0]]
             how = "swapped" if len(moved) == 2 else "in another order than their cameras"
             what = f"{' and '.join(names[i] for i in moved)} {how}"
-            yield Mistake(what, tracks, rates, clocks)
+            yield Mistake(what, Footage.of(tracks, None, rates, clocks))
     known = {i for i, camera in enumerate(rig.cameras) if camera.is_calibrated}
     for views in (*({i} for i in range(count)), {*range(count)}):
         told, ways = "all views", ["mirrored", "with v counted upwards"]
@@ -605,12 +591,12 @@ def _views(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
             elif not known & views:
                 ways = [", or ".join(ways)]
         for axis, how in enumerate(ways):
-            tracks = tuple(
+            tracks = [
                 np.where(np.arange(2) == axis, np.array(size) - 1 - track, track)
                 if i in views else track
-                for i, (track, size) in enumerate(zip(none.tracks, sizes, strict=True))
-            )  # fmt: skip
-            yield replace(none, what=f"{told} {how}", tracks=tracks)
+                for i, (track, size) in enumerate(zip(given.tracks, sizes, strict=True))
+            ]  # fmt: skip
+            yield Mistake(f"{told} {how}", Footage.of(tracks, None, given.rates, given.clocks))
 
 
 def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
@@ -622,34 +608,34 @@ def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
             yield moved, order.tolist()
 
 
-def _rates(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
+def _rates(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
     """Frame rates that are taken for each other."""
     count = len(names)
     for i in range(count):
         for real, stated in RATES:
-            rates = np.where(np.arange(count) == i, real / stated, 1.0) * none.rates
+            rates = np.where(np.arange(count) == i, real / stated, 1.0) * given.rates
             what = f"{names[i]} with {real} frames for {stated} that are supposed"
-            yield replace(none, what=what, rates=rates / rates[0])
+            yield Mistake(what, replace(given, rates=rates / rates[0]))
 
 
-def _dropped(none: Mistake, rig: Rig, names: Sequence[str], start: Floats) -> Iterator[Mistake]:
+def _dropped(given: Footage, rig: Rig, names: Sequence[str], start: Floats) -> Iterator[Mistake]:
     """Videos of which frames were dropped, with the clocks by which they agree all the time."""
-    length, ways = Footage.of(none.tracks, None, none.rates, none.clocks).lengths.min(), []
+    length, ways = given.lengths.min(), []
     for low in _PARTS:  # in one of them none is dropped, maybe: its cameras tell when
-        begins, ends = length * np.outer([low, low + _PART], none.rates)
-        rows = [(b <= c) & (c <= e) for b, c, e in zip(begins, none.clocks, ends, strict=True)]
+        begins, ends = length * np.outer([low, low + _PART], given.rates)
+        rows = [(b <= c) & (c <= e) for b, c, e in zip(begins, given.clocks, ends, strict=True)]
         tracks, clocks = (
-            [x[r] for x, r in zip(each, rows, strict=True)] for each in (none.tracks, none.clocks)
+            [x[r] for x, r in zip(each, rows, strict=True)] for each in (given.tracks, given.clocks)
         )
         if min(map(len, tracks)) > 1:
-            part = replace(none, tracks=tuple(tracks), clocks=tuple(c - c[0] for c in clocks))
-            ways += [_jumped(none, none, fit) for fit in part.near(rig, start)]
+            part = Footage.of(tracks, None, given.rates, [c - c[0] for c in clocks])
+            ways += [_jumped(given, given, fit) for fit in Mistake("", part).near(rig, start)]
     for _ in range(3):  # as what is mended tells the cameras, and these the rest
         if not ways:
             return
         _, lags, found = min(ways, key=lambda way: way[0])
-        ways = [_jumped(none, found, fit) for fit in found.fits(rig, lags)]
-    lacking = [np.diff(now - then) for now, then in zip(found.clocks, none.clocks, strict=True)]
+        ways = [_jumped(given, found, fit) for fit in Mistake("", found).fits(rig, lags)]
+    lacking = [np.diff(now - then) for now, then in zip(found.clocks, given.clocks, strict=True)]
     told = [
         f"{missing[k]:.0f} frames dropped of {name} before its frame {k + 1}"
         for name, missing in zip(names, lacking, strict=True)
@@ -657,17 +643,19 @@ def _dropped(none: Mistake, rig: Rig, names: Sequence[str], start: Floats) -> It
     ]
     if told:  # of several places one may have taken a few frames of another
         about = "about " if len(told) > 1 else ""
-        yield replace(found, what=", ".join(about + one for one in told))
+        yield Mistake(", ".join(about + one for one in told), found)
 
 
-def _jumped(none: Mistake, given: Mistake, fit: Adjustment) -> tuple[float, Floats, Mistake]:
+def _jumped(given: Footage, mended: Footage, fit: Adjustment) -> tuple[float, Floats, Footage]:
     """With the clock of one video set forward at some frames; what is missed, and its lags.
 
     The lags that leave the least, each jump at a price, by dynamic programming.
     """
-    lags, rates, tried = fit.footage.lags, given.rates, np.arange(-_LONGEST, _LONGEST + 1)
-    curves, missed_before, ways = tuple(map(Curve, given.tracks, given.clocks)), 0.0, []
-    for i, (camera, stated, curve) in enumerate(zip(fit.cameras, none.clocks, curves, strict=True)):
+    lags, rates, tried = fit.footage.lags, mended.rates, np.arange(-_LONGEST, _LONGEST + 1)
+    curves, missed_before, ways = mended.curves, 0.0, []
+    for i, (camera, stated, curve) in enumerate(
+        zip(fit.cameras, given.clocks, curves, strict=True)
+    ):
         stride = -(-len(stated) // _FRAMES)
         late = (curve.clock - stated)[::stride]
         middle = np.rint(late.mean())
@@ -691,11 +679,11 @@ def _jumped(none: Mistake, given: Mistake, fit: Adjustment) -> tuple[float, Floa
         missed_before += before / len(late) / 2  # as each pair of views counts twice
         later = np.repeat(tried[path] + middle, stride)[: len(stated)]
         ahead = np.where(np.arange(len(curves)) == i, later[0] / rates[i], 0.0) + lags
-        clocks = tuple(stated + later - later[0] if one is curve else one.clock for one in curves)
+        clocks = [stated + later - later[0] if one is curve else one.clock for one in curves]
         gain = (before - least) / len(late)
-        ways.append((gain, ahead - ahead[0], replace(given, clocks=clocks)))
-    gain, lags, mended = max(ways, key=lambda way: way[0])
-    return missed_before - gain, lags, mended
+        ways.append((gain, ahead - ahead[0], Footage.of(mended.tracks, None, rates, clocks)))
+    gain, lags, found = max(ways, key=lambda way: way[0])
+    return missed_before - gain, lags, found
 
 
 def _cheapest(costs: Floats) -> Ints:
