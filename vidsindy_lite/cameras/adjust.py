@@ -8,7 +8,7 @@ Wanted are the changes p of cameras and clocks (`PARTS`) and the points x of the
 
 smallest: pixels and measurements, each in units of its error. Each step of Gauss and Newton takes
 the points out first: of the slopes in p only what no move of the frame's own point can mimic counts
-(the Schur complement, here by QR). sigma is the noise that the residuals show, robustly; a frame
+(the Schur complement). sigma is the noise that the residuals show, robustly; a frame
 that is missed by more than `_OUTLIER` sigma is weighed down so that it pulls no more the further it
 is off (w = (limit / miss)^2, the weight of Geman and McClure's kind).
 
@@ -97,7 +97,7 @@ _IN_TIME = 1e-4  # ... if clocks move, whose slopes are rough, and in frames
 _LONGEST = 1.0  # frames: further than that, the slope in a lag does not hold
 _PROBE = 1e-6  # of a unit: slopes are taken over twice that, and less is no change
 _BESIDE = 2  # frames around an outlier into which interpolation carries a part of it
-_FLAT = 1e-9  # of the largest pivot; smaller ones leave a point where it is
+_FLAT = 1e-9  # of the largest singular value; in ways of smaller ones a point stays where it is
 # Tried in turn, until a step leads downhill: fine where focal length and distance hardly differ.
 _DAMPING = (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2)
 LAG, DRIFT = PARTS["lag"][0], PARTS["drift"][0]
@@ -311,19 +311,18 @@ class Adjustment:
 
     @cached_property
     def reduced(self) -> _Reduced:
-        """Slopes in the free changes, with the points taken out by QR."""
+        """Slopes in the free changes, with the points taken out."""
         seen = np.isfinite(self.misses)[..., None]
         in_change, in_points = (np.where(seen, np.nan_to_num(part), 0.0) for part in self._slopes())
-        q, r = np.linalg.qr(in_points)
-        pivots = np.abs(np.diagonal(r, axis1=1, axis2=2))
-        told = pivots.min(axis=1, initial=np.inf) > _FLAT * pivots.max(axis=1, initial=0)
-        q, r = np.where(told[:, None, None], q, 0.0), np.where(told[:, None, None], r, np.eye(3))
+        q, size, ways = np.linalg.svd(in_points, full_matrices=False)
+        told = size > _FLAT * size.max(axis=1, initial=0, keepdims=True)
+        q, back = q * told[:, None], -ways.swapaxes(1, 2) / np.where(told, size, 1.0)[:, None]
         missed = np.nan_to_num(self.misses)[..., None]
         of_change, of_misses = (q.swapaxes(1, 2) @ part for part in (in_change, missed))
         return _Reduced(
             in_change - q @ of_change,
-            -np.linalg.solve(r, of_misses)[..., 0],
-            -np.linalg.solve(r, of_change),
+            (back @ of_misses)[..., 0],
+            back @ of_change,
             of_misses[..., 0],
         )
 
@@ -378,8 +377,8 @@ class _Reduced(NamedTuple):
     """Slopes, (n, 2 m, p), with the points taken out.
 
     The points move by `own`, (n, 3), to where they are missed least, and with the changes by
-    `follow`, (n, 3, p); a point that its views do not tell stays. `along`, (n, 3), is what of the
-    misses they take up.
+    `follow`, (n, 3, p); where its views do not tell a point it stays. `along`, (n, 3), is what of
+    the misses they take up.
     """
 
     slopes: Floats

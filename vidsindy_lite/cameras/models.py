@@ -973,11 +973,7 @@ def _gauss_newton(
 
 
 def _least_squares(left: Floats, right: Floats) -> Floats:
-    """Solutions of many small systems; zero where one is singular: a point that ran far away."""
-    q, r = np.linalg.qr(left)
-    pivots = np.abs(np.diagonal(r, axis1=1, axis2=2))
-    singular = ~(pivots.min(axis=1) > PARALLEL**2 * pivots.max(axis=1))
-    r[singular] = np.eye(left.shape[2])
-    x = np.linalg.solve(r, q.swapaxes(1, 2) @ right[..., None])[..., 0]
-    x[singular] = 0
-    return x
+    """Solutions of many small systems; zero where numbers overflow: a point that ran far away."""
+    whole = np.isfinite(left).all(axis=(1, 2), keepdims=True)
+    inverse = np.linalg.pinv(np.where(whole, left, 0.0), rcond=PARALLEL**2)
+    return (inverse @ right[..., None])[..., 0]
