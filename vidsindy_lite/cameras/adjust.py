@@ -162,18 +162,16 @@ def bandwidth(series: Floats) -> float:
 def known_to(given: Camera) -> Floats:
     """Standard errors of a camera of a rig: zero what is exact, infinite what is to be learned."""
     errors = np.zeros(SIZE)
-    errors[PARTS["normal"]] = np.deg2rad(given.normal_error)
-    errors[PARTS["angle"]] = np.deg2rad(given.normal_error) if given.is_calibrated else np.inf
-    errors[PARTS["scale"]] = given.scale_error if given.is_calibrated else np.inf
-    errors[PARTS["position"]] = given.position_error if given.is_placed else np.inf
+    for part in ("scale", "position", "principal point", "distortion", "readout"):
+        errors[PARTS[part]] = getattr(given, f"{part.replace(' ', '_')}_error", 0.0)
+    errors[PARTS["normal"] + PARTS["angle"]] = np.deg2rad(given.normal_error)
+    errors[PARTS["distortion"][2:]] *= _TANGENTIAL
+    if not given.is_calibrated:
+        errors[PARTS["angle"] + PARTS["scale"]] = np.inf
+    if not given.is_placed:
+        errors[PARTS["position"]] = np.inf
     if isinstance(given, OrthographicCamera):
         errors[PARTS["position"][2]] = 0.0  # it sees the same from anywhere on its axis
-    errors[PARTS["principal point"]] = given.principal_point_error
-    if isinstance(given, PerspectiveCamera):
-        errors[PARTS["distortion"]] = given.distortion_error * np.array(
-            [1, 1, _TANGENTIAL, _TANGENTIAL]
-        )
-    errors[PARTS["readout"]] = given.readout_error
     return errors
 
 

@@ -31,7 +31,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..checks import check_instance
 from .adjust import DRIFT, LAG, PARTS, adjust, known_to
-from .clocks import Footage, Lags, check_clocks
+from .clocks import Footage, Lags
 from .models import (
     ROUNDING,
     Camera,
@@ -415,8 +415,7 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     errors = np.array([known_to(camera) for camera in rig.cameras])
     moving = (lags.errors > 0) & np.isfinite(lags.errors)
     errors[moving, LAG] = errors[lags.rate_errors > 0, DRIFT] = np.inf
-    clocks = check_clocks(lags.clocks or None, tracks)
-    footage = Footage.of(tracks, lags.frames, lags.rates, clocks)
+    footage = Footage.of(tracks, lags.frames, lags.rates, lags.clocks or None)
     near = adjust(footage, learned.cameras, errors, most=0)
     modes = np.einsum("ik,nji->knj", near.factor, near.reduced.follow)
     if not rig.note:

@@ -113,10 +113,7 @@ def align(
         If a track has a wrong shape or an infinite value, or there is not one finite lag, positive
         rate, or increasing clock, per track, or a lag or rate is absurdly large or small.
     """
-    tracks = check_tracks(tracks)
-    shifts = check_lags("lags", lags, len(tracks))
-    speeds = check_rates(rates, len(tracks))
-    return Footage.of(tracks, shifts, speeds, check_clocks(clocks, tracks)).aligned
+    return Footage.of(check_tracks(tracks), lags, rates, clocks).aligned
 
 
 def list_lags(lags: Sequence[float] | Floats) -> str:
@@ -208,15 +205,14 @@ class Footage:
     def of(
         cls,
         tracks: Sequence[Floats],
-        lags: Floats | None = None,
-        rates: Floats | None = None,
-        clocks: Sequence[Floats] | None = None,
+        lags: ArrayLike | None = None,
+        rates: ArrayLike | None = None,
+        clocks: Sequence[ArrayLike] | None = None,
     ) -> Footage:
-        """Of what was checked; by default the tracks are at the same instants already."""
-        ticks, still = clocks or check_clocks(None, tracks), np.zeros(len(tracks))
-        curves = tuple(map(Curve, tracks, ticks))
-        shifts, speeds = still if lags is None else lags, still + 1 if rates is None else rates
-        return cls(curves, ticks[0], shifts, speeds)
+        """Of checked tracks; by default they are at the same instants already."""
+        curves = tuple(map(Curve, tracks, check_clocks(clocks, tracks)))
+        shifts = check_lags("lags", lags, len(tracks))
+        return cls(curves, curves[0].clock, shifts, check_rates(rates, len(tracks)))
 
     @property
     def tracks(self) -> tuple[Floats, ...]:
@@ -274,9 +270,9 @@ class Footage:
         return lag, lag * ((self.instants - self.middle) / self.span)[:, None]
 
 
-def check_lags(name: str, lags: ArrayLike, count: int) -> Floats:
+def check_lags(name: str, lags: ArrayLike | None, count: int) -> Floats:
     """One lag per video, counted from the first one's."""
-    checked = check_vector(name, lags, count)
+    checked = np.zeros(count) if lags is None else check_vector(name, lags, count)
     far = np.abs(checked).max()
     if far > _FARTHEST:
         raise ValueError(f"{name}: must be at most {_FARTHEST:g} frames, got {far:g}")

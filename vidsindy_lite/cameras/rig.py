@@ -610,11 +610,10 @@ def read_calibration(
         raise ValueError(f"paths: must be a list of files, got {shown(paths)}")
     for given in paths:
         path = check_file("paths", given, "calibration file")
-        content = _content(path)
-        before = len(warnings)
+        content, told = _content(path), list[str]()
         with reading("paths", path):
-            found = list(_cameras(content, size, warnings))
-        warnings[before:] = [f"{path.name}: {warning}" for warning in warnings[before:]]
+            found = list(_cameras(content, size, told))
+        warnings += [f"{path.name}: {one}" for one in told]
         if not found:
             raise ValueError(
                 f"paths: must hold a camera matrix (K), DLT coefficients or P, got none in '{path}'"

@@ -45,18 +45,7 @@ from ..arrays import Floats, Ints
 from ..progress import bar
 from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, known_to
 from .calibrate import check_learnable, closed_form
-from .clocks import (
-    INSTANTS,
-    OVERLAP,
-    Footage,
-    Lags,
-    align,
-    check_clocks,
-    check_lags,
-    check_rates,
-    dips,
-    list_lags,
-)
+from .clocks import INSTANTS, OVERLAP, Footage, Lags, check_lags, dips, list_lags
 from .models import TRIMMED, Camera, at_once, epipolar_lines, epipolar_rows, missed, trimmed
 from .rig import ALIKE, BETTER, DISAGREEMENT, FINE, GROSS, Rig, check_seen
 from .unmeasured import posed
@@ -252,11 +241,10 @@ def learn_lags(
     """
     check_learnable(rig)
     tracks = check_seen(tracks, rig)
-    first = check_lags("start", np.zeros(len(tracks)) if start is None else start, len(tracks))
-    given = check_rates(rates, len(tracks))
-    rig = posed(align(tracks, first, given, clocks), rig, synchronous=False)
+    first = check_lags("start", start, len(tracks))
+    footage = Footage.of(tracks, None, rates, clocks)
+    rig = posed(replace(footage, lags=first).aligned, rig, synchronous=False)
     with bar(progress, "synchronise", unit="fit") as shown:
-        footage = Footage.of(tracks, None, given, check_clocks(clocks, tracks))
         found = _learned(_Videos.of(footage, rig, shown), first)
     return found if clocks is None else replace(found, clocks=footage.clocks)
 
@@ -275,11 +263,6 @@ class _Videos:
         still = at_once(rig.cameras, given.tracks)
         instant = tuple(replace(camera, readout=0.0) for camera in rig.cameras)
         return cls(Footage.of(still, None, given.rates, given.clocks), instant, shown)
-
-    def footage(self, lags: Floats, rough: bool = False) -> Footage:
-        """All instants, or some."""
-        every = replace(self.given, lags=lags)
-        return every.some if rough else every
 
     def cameras(self, footage: Footage) -> tuple[Camera, ...] | None:
         """Those that the closed form finds; None if it finds none."""
@@ -308,7 +291,7 @@ class _Videos:
         """The best lags near given ones, or better ones than these; None if nothing fits."""
         if self.shown is not None:
             self.shown.update()
-        footage = self.footage(lags, rough)
+        footage = replace(self.given.some if rough else self.given, lags=lags)
         cameras = self.cameras(footage)
         if cameras is None:
             return None
@@ -448,7 +431,7 @@ def _told(videos: _Videos, fit: Adjustment, first: Floats) -> Lags:
 def _untold(videos: _Videos, lags: Floats, agree: bool) -> Lags:
     """Lags of which the tracks tell nothing, as all agree or none; the first one is the clock."""
     errors = np.where(np.arange(len(lags)) > 0, np.inf, 0.0)
-    residual, footage = np.inf, videos.footage(lags)
+    residual, footage = np.inf, replace(videos.given, lags=lags)
     cameras = videos.cameras(footage)
     if cameras is not None:
         residual = max(map(trimmed, missed(cameras, footage.aligned)))
@@ -524,7 +507,7 @@ def find_mistake(
     names : sequence of str
         What the videos are called.
     """
-    given = Footage.of(tracks, None, rates, check_clocks(clocks, tracks))
+    given = Footage.of(tracks, None, rates, clocks)
     none = Mistake("", given)
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
         begun = none.near(rig, start)
@@ -628,7 +611,7 @@ def _dropped(given: Footage, rig: Rig, names: Sequence[str], start: Floats) -> I
             [x[r] for x, r in zip(each, rows, strict=True)] for each in (given.tracks, given.clocks)
         )
         if min(map(len, tracks)) > 1:
-            part = Footage.of(tracks, None, given.rates, [c - c[0] for c in clocks])
+            part = Footage.of(tracks, None, given.rates, clocks)
             ways += [_jumped(given, given, fit) for fit in Mistake("", part).near(rig, start)]
     for _ in range(3):  # as what is mended tells the cameras, and these the rest
         if not ways:

@@ -38,7 +38,7 @@ from scipy.optimize import least_squares
 
 from ..arrays import Floats
 from .adjust import PARTS, Adjustment, adjust, known_to
-from .clocks import OVERLAP, Footage, Lags, check_clocks, dips
+from .clocks import OVERLAP, Footage, Lags, dips
 from .models import AffineCamera, PerspectiveCamera, at_once, missed
 from .rig import ALIKE, BETTER, FINE, GROSS, Rig, check_views
 
@@ -311,7 +311,7 @@ def factorised(
     rates, clocks, lags
         See `align`; lags are found if they are not given.
     """
-    films = Footage.of(tracks, None, rates, check_clocks(clocks, tracks))
+    films = Footage.of(tracks, None, rates, clocks)
     some, ranks, every = films.some, range(1, 4), range(len(tracks))
     found = [
         _best(some, rank)
