@@ -56,7 +56,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats
 from ..checks import (
     check_array,
     check_image_size,
@@ -532,14 +532,14 @@ def undistorted(points: Floats, coefficients: Floats) -> Floats:
     shown = np.isfinite(points).all(axis=1)
     wanted = points[shown]
 
-    def look(tried: Floats, which: Ints) -> tuple[Floats, Floats]:
+    def look(tried: Floats) -> tuple[Floats, Floats]:
         seen, slope = _lens(tried, coefficients)
         # Where the slope is not positive definite the image turns over: no lens does that.
         good = (slope[:, 0, 0] > 0) & (slope[:, 0, 0] * slope[:, 1, 1] > slope[:, 0, 1] ** 2)
-        return slope, np.where(good[:, None], wanted[which] - seen, np.nan)
+        return slope, np.where(good[:, None], wanted - seen, np.nan)
 
     found, _ = _gauss_newton(look, wanted, _SETTLED)
-    _, missed = look(found, np.arange(len(found)))
+    _, missed = look(found)
     found[~(np.abs(missed).max(axis=1) < np.sqrt(_SETTLED))] = np.nan
     ideal[shown] = found
     return ideal
@@ -841,9 +841,8 @@ def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floa
     x, ended = np.full((len(crossing), 3), np.nan), np.ones(len(crossing), bool)
     seen, visible = seen[crossing], visible[crossing]
 
-    def look(point: Floats, frames: Ints) -> tuple[Floats, Floats]:
-        slope, missed = _reprojection(matrices, scales, seen[frames], point)
-        return _stacked(slope, missed, visible[frames])
+    def look(point: Floats) -> tuple[Floats, Floats]:
+        return _stacked(*_reprojection(matrices, scales, seen, point), visible)
 
     start = _least_squares(left[crossing], right[crossing])
     point, settled = _gauss_newton(look, start, SETTLED)
@@ -945,31 +944,29 @@ def _stacked(left: Floats, right: Floats, visible: Bools) -> tuple[Floats, Float
 
 
 def _gauss_newton(
-    look: Callable[[Floats, Ints], tuple[Floats, Floats]], start: Floats, enough: float
+    look: Callable[[Floats], tuple[Floats, Floats]], start: Floats, enough: float
 ) -> tuple[Floats, Bools]:
     """Points of the least squared misses, each searched by itself, and which of them settled.
 
-    `look(points, frames)` gives the slopes, (k, m, d), and the misses, (k, m); a last step changes
-    these by so little.
+    `look(points)` gives the slopes, (n, m, d), and the misses, (n, m); a last step changes these by
+    so little.
     """
-    point, active = start.copy(), np.arange(len(start))
+    point, settled = start.copy(), np.zeros(len(start), bool)
     part = np.ones(len(start))  # of the step, halved where the whole one leads uphill
-    slope, missed = look(point, active)
+    slope, missed = look(point)
     for _ in range(_STEPS):
-        step = part[active, None] * _least_squares(slope[active], missed[active])
+        step = part[:, None] * _least_squares(slope, missed)
         with np.errstate(all="ignore"):  # lines that hardly cross may send a point far away
-            new_slope, new_missed = look(point[active] + step, active)
-            new_error, error = np.sum(new_missed**2, axis=1), np.sum(missed[active] ** 2, axis=1)
-        moved = np.abs(slope[active] @ step[..., None]).max(axis=(1, 2), initial=0)
+            new_slope, new_missed = look(point + step)
+            new_error, error = np.sum(new_missed**2, axis=1), np.sum(missed**2, axis=1)
+        settled |= np.abs(slope @ step[..., None]).max(axis=(1, 2), initial=0) <= enough
         lower = new_error <= (1 + 1e-12) * error + enough**2  # or equal, but for rounding
-        part[active] = np.where(lower, 1, part[active] / 2)
-        taken = active[lower]
-        point[taken] += step[lower]
-        slope[taken], missed[taken] = new_slope[lower], new_missed[lower]
-        active = active[~(moved <= enough)]
-        if not active.size:
+        part = np.where(lower, 1, part / 2)
+        point[lower] += step[lower]
+        slope[lower], missed[lower] = new_slope[lower], new_missed[lower]
+        if settled.all():
             break
-    return point, ~np.isin(np.arange(len(start)), active)
+    return point, settled
 
 
 def _least_squares(left: Floats, right: Floats) -> Floats:
