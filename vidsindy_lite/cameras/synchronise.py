@@ -388,11 +388,8 @@ def _moved(fit: Adjustment) -> float:
 
 def _different(found: list[Adjustment]) -> list[Adjustment]:
     """The first of all that have the same lags."""
-    kept: list[Adjustment] = []
-    for one in found:
-        if not any(near(one, other.footage.lags) for other in kept):
-            kept.append(one)
-    return kept
+    lags = [one.footage.lags for one in found]
+    return [f for k, f in enumerate(found) if not any(near(f, other) for other in lags[:k])]
 
 
 # --------------------------------------------------------------------- errors, and what is told
