@@ -99,17 +99,29 @@ _MEASURED = """\
 # Cameras stand still. Errors are those of a tape and of the eye: one standard deviation each; the
 # videos then tell better. Without its error, a number is taken as exact.
 """
-_SCALE = "scale = 0.005    # scene units per pixel: length of an object over its pixels"
-_ANGLE = """\
+_FLAT = """
+[[camera]]
+position = [{place}]    # of the camera, or a landmark in the middle of its image
+normal = [{normal}]    # from the scene to the camera; any length
+image_size = [{width}, {height}]
+"""
+_FIRST = """\
+scale = 0.005    # scene units per pixel: length of an object over its pixels
 angle = {angle:.3f}    # radians: for this normal and the z axis upright in the image; add how
-                  # far the z axis is turned anticlockwise there"""
-_BY_HAND = """\
+                  # far the z axis is turned anticlockwise there
+"""
+_BY_HAND = """
+[[camera]]
+model = "perspective"
+position = [{place}]    # of its lens
+image_size = [{width}, {height}]
 looks_at = [0.000, 0.000, 0.000]    # what stands in the middle of its image (or give normal)
 field_of_view = 60    # degrees across the width of the video (or give scale and angle)
 roll = 0    # degrees by which the z axis leans to the left in its image; 0 for a level camera
 position_error = 0.03    # metres in each direction
 normal_error = 2    # degrees, of where it looks and of its roll
-scale_error = 0.03    # share of the focal length: 3 %"""
+scale_error = 0.03    # share of the focal length: 3 %
+"""
 _LOOKS = ("looks_at", "field_of_view", "roll")  # keys that a hand can measure
 _NAMES = {
     "K": ("k", "matrix", "camera_matrix", "cameramatrix", "intrinsics", "intrinsic_matrix", "mtx"),
@@ -497,23 +509,17 @@ def rig_template(
     check_choice("model", model, [OrthographicCamera.model, PerspectiveCamera.model])
     width, height = check_image_size(image_size)
     flat = model == OrthographicCamera.model
-    parts = [_HEAD + (_STILL if flat else _MEASURED)]
+    text = _HEAD + (_STILL if flat else _MEASURED)
     for i in range(cameras):
         # Of two cameras, one is a third of a turn from the other: face to face both see the same.
         azimuth = 2 * np.pi * i / max(cameras, 3) + np.deg2rad(20)
         normal, upright = _looking_down(azimuth, np.deg2rad(20))
-        place, size = f"position = [{decimals(3 * normal)}]", f"image_size = [{width}, {height}]"
-        if flat:
-            lines = [
-                f"{place}    # of the camera, or a landmark in the middle of its image",
-                f"normal = [{decimals(normal)}]    # from the scene to the camera; any length",
-                size,
-                *((_SCALE, _ANGLE.format(angle=upright)) if i == 0 else ()),
-            ]
-        else:
-            lines = [f'model = "{model}"', f"{place}    # of its lens", size, _BY_HAND]
-        parts.append("\n".join(["[[camera]]", *lines]) + "\n")
-    return "\n".join(parts)
+        camera = _BY_HAND if not flat else _FLAT if i else _FLAT + _FIRST
+        text += camera.format(
+            place=decimals(3 * normal), normal=decimals(normal), angle=upright, width=width,
+            height=height,
+        )  # fmt: skip
+    return text
 
 
 def _looking_down(azimuth: float, elevation: float) -> tuple[Floats, float]:

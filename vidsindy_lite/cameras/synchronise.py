@@ -274,9 +274,8 @@ class _Videos:
     def errors(self, rough: bool = False, loose: bool = False) -> Floats:
         """What is known of cameras, and of all lags but the first one's nothing."""
         errors = np.array([known_to(camera) for camera in self.known])
-        if (
-            rough and len(self.given.instants) > INSTANTS
-        ):  # which are too few to tell where the target was between two
+        # Some instants are too few to tell where the target was between two.
+        if rough and len(self.given.instants) > INSTANTS:
             errors[:, PARTS["readout"]] = 0.0
         errors[1:, LAG] = np.inf
         if loose:
@@ -633,9 +632,8 @@ def _jumped(given: Footage, mended: Footage, fit: Adjustment) -> tuple[float, Fl
     """
     lags, rates, tried = fit.footage.lags, mended.rates, np.arange(-_LONGEST, _LONGEST + 1)
     curves, missed_before, ways = mended.curves, 0.0, []
-    for i, (camera, stated, curve) in enumerate(
-        zip(fit.cameras, given.clocks, curves, strict=True)
-    ):
+    each = zip(fit.cameras, given.clocks, curves, strict=True)
+    for i, (camera, stated, curve) in enumerate(each):
         stride = -(-len(stated) // _FRAMES)
         late = (curve.clock - stated)[::stride]
         middle = np.rint(late.mean())

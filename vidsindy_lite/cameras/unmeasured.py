@@ -268,20 +268,14 @@ def _framed(rig: Rig, fit: Adjustment, mirrored: bool) -> Rig:
 
 def _note(rig: Rig) -> str:
     """What cannot be known of a rig that nobody has measured."""
-    length = (
-        "the unit of length is the distance from the first camera to the second"
-        if rig.distance is None
-        else f"the first camera is {rig.distance:g} from the second"
-    )
-    lenses = (
-        "; focal lengths are those that the tracks tell"
-        if any(camera.scale is None for camera in rig.cameras)
-        else ""
-    )
+    told = "the unit of length is the distance from the first camera to the second"
+    if rig.distance is not None:
+        told = f"the first camera is {rig.distance:g} from the second"
+    if any(camera.scale is None for camera in rig.cameras):
+        told += "; focal lengths are those that the tracks tell"
     return (
         "nothing is measured of where the cameras stand: x is to the right and y up in the image "
-        "of the first camera, z points towards it, the origin is the middle of the path, "
-        f"{length}{lenses}"
+        f"of the first camera, z points towards it, the origin is the middle of the path, {told}"
     )
 
 
@@ -313,12 +307,7 @@ def factorised(
     """
     films = Footage.of(tracks, None, rates, clocks)
     some, ranks, every = films.some, range(1, 4), range(len(tracks))
-    found = [
-        _best(some, rank)
-        if lags is None
-        else (_left(some, lags, every, rank), lags, np.zeros(len(tracks)))
-        for rank in ranks
-    ]
+    found = [_best(some, rank, lags) for rank in ranks]
     enough = max(BETTER * found[-1][0], FINE)
     rank = next(rank for rank, (left, *_) in zip(ranks, found, strict=True) if left <= enough)
     left, best, errors = found[rank - 1]
@@ -362,15 +351,18 @@ def _left(footage: Footage, lags: Floats, places: Sequence[int], rank: int) -> f
     return float(np.sqrt(np.nansum(beyond**2) / (count * (width - rank))))
 
 
-def _best(footage: Footage, rank: int) -> tuple[float, Floats, Floats]:
+def _best(footage: Footage, rank: int, given: Floats | None) -> tuple[float, Floats, Floats]:
     """What the lags leave beyond a rank that leave least, those lags, and their errors.
 
+    Unless they are given.
     Of two views, lags are promising that leave less than their neighbours; of three, these are
     tried together, and further views one by one. Of those that leave about as little, the
     shortest count.
     """
     count = len(footage.curves)
     lags = np.zeros(count)
+    if given is not None:
+        return _left(footage, given, range(count), rank), given, lags
     promising = [_promising(footage, i, rank)[:_PROMISING] or [0.0] for i in range(1, count)]
     for last in range(3, count + 1):
         tried = []
