@@ -36,7 +36,6 @@ from .models import (
     ROUNDING,
     Camera,
     all_orthographic,
-    at_once,
     epipolar_lines,
     epipolar_rows,
     independent,
@@ -343,8 +342,7 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
             "scales and angles may be off; check the positions and normals, or give more of what "
             "is known",
         )
-    measured = (errors > 0) & np.isfinite(errors)
-    off = np.where(measured, np.abs(found.change) / np.where(measured, errors, 1.0), 0.0)
+    off = np.abs(found.change) / np.where(errors > 0, errors, np.inf)
     # Standard errors that a measurement may be off.
     if off.max() > 5.0:
         i, part = np.unravel_index(off.argmax(), off.shape)
@@ -418,10 +416,7 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     footage = Footage.of(tracks, lags.frames, lags.rates, lags.clocks or None)
     near = adjust(footage, learned.cameras, errors, most=0)
     modes = np.einsum("ik,nji->knj", near.factor, near.reduced.follow)
-    if not rig.note:
-        return modes
-    still = at_once(learned.cameras, footage.aligned)
-    return _of_shape(modes, intersect(learned.cameras, still)[0])
+    return _of_shape(modes, near.points) if rig.note else modes
 
 
 def _of_shape(modes: Floats, x: Floats) -> Floats:

@@ -242,8 +242,7 @@ class Footage:
     @cached_property
     def aligned(self) -> tuple[Floats, ...]:
         """The tracks at the instants, (n, 2)."""
-        frames = map(self.frames, range(len(self.curves)))
-        return tuple(curve.at(at) for curve, at in zip(self.curves, frames, strict=True))
+        return tuple(curve.at(self.frames(i)) for i, curve in enumerate(self.curves))
 
     @property
     def some(self) -> Footage:
@@ -353,18 +352,16 @@ class Clock:
         """
         if not (isinstance(t, list | tuple) and len(t) == len(tracks) and np.ndim(t[0])):
             times = _one_each(cast("ArrayLike", t), len(tracks[0]), "row of tracks[0]")
-            even = [np.arange(len(track), dtype=float) for track in tracks]
-            return cls(times, np.ones(len(tracks)), even)
+            return cls(times, np.ones(len(tracks)), check_clocks(None, tracks))
         stated = [
             _one_each(one, len(track), f"row of tracks[{i}]")
             for i, (one, track) in enumerate(zip(t, tracks, strict=True))
         ]
         usual = np.array([np.median(np.diff(times)) if len(times) > 1 else 1 for times in stated])
         frames = [(times - times[0]) / step for times, step in zip(stated, usual, strict=True)]
-        whole = [np.rint(one) for one in frames]  # if they are, but for rounding
-        near = [np.abs(a - b).max() < _ROUNDING for a, b in zip(frames, whole, strict=True)]
-        rounded = [a if close else b for close, a, b in zip(near, whole, frames, strict=True)]
-        return cls(stated[0], usual[0] / usual, rounded)
+        even = [np.abs(one - np.rint(one)).max() < _ROUNDING for one in frames]
+        frames = [np.rint(one) if near else one for near, one in zip(even, frames, strict=True)]
+        return cls(stated[0], usual[0] / usual, frames)
 
     @classmethod
     def of_videos(

@@ -836,7 +836,7 @@ def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floa
     visible = np.asarray(np.isfinite(seen).all(axis=-1))
     seen = np.where(visible[..., None], seen, 0)
 
-    left, right = _stacked(*_lines(matrices, scales, seen), visible)
+    left, right = _stacked(*_lines(matrices, scales[:, None] * seen), visible)
     crossing = (np.linalg.svd(left, compute_uv=False) > PARALLEL).sum(axis=1) == 3
     x, ended = np.full((len(crossing), 3), np.nan), np.ones(len(crossing), bool)
     seen, visible = seen[crossing], visible[crossing]
@@ -879,8 +879,8 @@ def epipolar_lines(known: Camera, pixels: Floats, unknown: Camera) -> tuple[Floa
         h x g in the same unit: scene units, or for a perspective camera those at distance 1.
     """
     known, unknown = (c if c.is_placed else c.placed(np.zeros(2)) for c in (known, unknown))
-    turned, scale = known.turned(pixels)[:, None], np.array([known.calibration[0]])
-    left, right = (part[:, 0] for part in _lines(known.matrix[None], scale, turned))
+    plane = known.calibration[0] * known.turned(pixels)[:, None]
+    left, right = (part[:, 0] for part in _lines(known.matrix[None], plane))
     one, other = left[:, 0], left[:, 1]
     direction = np.cross(one, other)
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -916,14 +916,13 @@ def epipolar_rows(
     return design, constants - design @ (scale * np.array([np.cos(angle), np.sin(angle)]))
 
 
-def _lines(matrices: Floats, scales: Floats, turned: Floats) -> tuple[Floats, Floats]:
-    """Equations left @ x = right of the lines of sight at T x_c, scene units.
+def _lines(matrices: Floats, plane: Floats) -> tuple[Floats, Floats]:
+    """Equations left @ x = right of the lines of sight at s T x_c, scene units.
 
-    From (m, 3, 4), (m,) and (n, m, 2) to (n, m, 2, 3) and (n, m, 2).
+    From (m, 3, 4) and (n, m, 2) to (n, m, 2, 3) and (n, m, 2).
     """
-    seen = scales[:, None] * turned
-    left = matrices[:, :2, :3] - seen[..., None] * matrices[:, None, 2, :3]
-    return left, seen * matrices[:, 2, 3, None] - matrices[:, :2, 3]
+    left = matrices[:, :2, :3] - plane[..., None] * matrices[:, None, 2, :3]
+    return left, plane * matrices[:, 2, 3, None] - matrices[:, :2, 3]
 
 
 def _reprojection(
@@ -932,7 +931,7 @@ def _reprojection(
     """Slope of the T x_c at which points are seen, (n, m, 2, 3), and how far it is off."""
     image = np.moveaxis(x @ matrices[:, :, :3].swapaxes(1, 2), 0, 1) + matrices[:, :, 3]
     plane, depth = image[..., :2] / image[..., 2:], image[..., 2, None, None]
-    slope = matrices[:, :2, :3] - plane[..., None] * matrices[:, None, 2, :3]
+    slope, _ = _lines(matrices, plane)
     return slope / (scales[:, None, None] * depth), turned - plane / scales[:, None]
 
 

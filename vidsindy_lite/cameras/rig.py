@@ -529,29 +529,28 @@ def _looking_down(azimuth: float, elevation: float) -> tuple[Floats, float]:
     return normal, np.arctan2(-np.cos(azimuth), -np.sin(azimuth))
 
 
-def _by_hand(table: dict[str, Any], model: str) -> dict[str, Any]:
+def _by_hand(known: dict[str, Any], model: str) -> dict[str, Any]:
     """A table with normal, scale and angle in place of what a hand measures."""
-    known = {key: value for key, value in table.items() if key not in _LOOKS}
-    if "looks_at" in table:
-        if "normal" in table or "position" not in table:
+    aim, across, roll = (known.pop(key, None) for key in _LOOKS)
+    if aim is not None:
+        if "normal" in known or "position" not in known:
             raise ValueError("looks_at: must be given with a position and without a normal")
-        position = check_vector("position", table["position"], 3)
-        known["normal"] = position - check_vector("looks_at", table["looks_at"], 3)
-    if "field_of_view" in table:
-        if model == OrthographicCamera.model or "scale" in table or "angle" in table:
+        position = check_vector("position", known["position"], 3)
+        known["normal"] = position - check_vector("looks_at", aim, 3)
+    if across is not None:
+        if model == OrthographicCamera.model or "scale" in known or "angle" in known:
             raise ValueError(
                 "field_of_view: must be given in place of scale and angle, perspective"
             )
-        width = check_image_size(table.get("image_size", Camera.image_size))[0]
-        across = check_number("field_of_view", table["field_of_view"])
-        if not 0 < across < 180:
+        width = check_image_size(known.get("image_size", Camera.image_size))[0]
+        if not 0 < check_number("field_of_view", across) < 180:
             raise ValueError(f"field_of_view: must be between 0 and 180 degrees, got {across:g}")
         known["scale"] = 2 * np.tan(np.deg2rad(across) / 2) / width
-        roll = check_number("roll", table.get("roll", 0.0))
+        leans = check_number("roll", 0.0 if roll is None else roll)
         if "normal" in known:
             x, y = rotation_to_z(known["normal"])[:2, 2]
-            known["angle"] = float(np.arctan2(x, y) + np.deg2rad(roll))
-    elif "roll" in table:
+            known["angle"] = float(np.arctan2(x, y) + np.deg2rad(leans))
+    elif roll is not None:
         raise ValueError("roll: must be given with a field_of_view")
     return known
 

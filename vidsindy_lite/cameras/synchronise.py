@@ -469,21 +469,24 @@ class Mistake:
             + (f"; as well do {', and '.join(self.alike)}: another path" if self.alike else "")
         )
 
-    def paired(self, cameras: Sequence[Camera]) -> tuple[float, Floats]:
-        """By how much two views disagree at their best lags, all pairs; and these lags."""
-        each = [*lag_misses(self.footage, cameras, _INSTANTS)]
-        lags = np.array([tried[left.argmin()] for tried, left in each])
-        return float(np.linalg.norm([left.min() for _, left in each])), lags - lags[0]
 
-    def fits(self, rig: Rig, *lags: Floats) -> list[Adjustment]:
-        """Cameras and lags near these, roughly."""
-        videos = _Videos.of(self.footage, rig)
-        found = [videos.fitted(each, rough=True) for each in np.unique(lags, axis=0)]
-        return [fit for fit in found if fit]
+def _paired(footage: Footage, cameras: Sequence[Camera]) -> tuple[float, Floats]:
+    """By how much two views disagree at their best lags, all pairs; and these lags."""
+    each = [*lag_misses(footage, cameras, _INSTANTS)]
+    lags = np.array([tried[left.argmin()] for tried, left in each])
+    return float(np.linalg.norm([left.min() for _, left in each])), lags - lags[0]
 
-    def near(self, rig: Rig, start: Floats) -> list[Adjustment]:
-        """Near given lags and the best of two views, which are as rough as the rig."""
-        return self.fits(rig, start, self.paired(rig.cameras)[1])
+
+def _fits(footage: Footage, rig: Rig, *lags: Floats) -> list[Adjustment]:
+    """Cameras and lags near these, roughly."""
+    videos = _Videos.of(footage, rig)
+    found = [videos.fitted(each, rough=True) for each in np.unique(lags, axis=0)]
+    return [fit for fit in found if fit]
+
+
+def _near(footage: Footage, rig: Rig, start: Floats) -> list[Adjustment]:
+    """Near given lags and the best of two views, which are as rough as the rig."""
+    return _fits(footage, rig, start, _paired(footage, rig.cameras)[1])
 
 
 def find_mistake(
@@ -504,27 +507,26 @@ def find_mistake(
         What the videos are called.
     """
     given = Footage.of(tracks, None, rates, clocks)
-    none = Mistake("", given)
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
-        begun = none.near(rig, start)
+        begun = _near(given, rig, start)
         left = min(map(_worst, begun), default=np.inf)
         if left <= 2 * DISAGREEMENT:
             return None
         found: list[Mistake] = []
         # Whole views are not mistaken where most frames agree.
         most = min((fit.left() for fit in begun), default=np.inf) <= 2 * DISAGREEMENT
-        for kind in (partial(_dropped, start=start), *(() if most else (_views, _rates))):
+        for kind in (partial(_dropped, start=start), *(() if most else (_whole,))):
             if found and found[-1].lags.residual <= DISAGREEMENT:
                 break
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
             # none.
             each = {one.what: one for one in kind(given, rig, names)}.values()
-            ranked = [(*one.paired(rig.cameras), one) for one in each]
+            ranked = [(*_paired(one.footage, rig.cameras), one) for one in each]
             ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
             tried = [
                 (_worst(fit), fit, one)
                 for _, best, one in ranked
-                for fit in one.fits(rig, start, best)
+                for fit in _fits(one.footage, rig, start, best)
             ]
             for now, fit, one in sorted(tried, key=lambda one: one[0]):
                 # Times by which it has to mend the disagreement of all views together.
@@ -548,16 +550,15 @@ def _worst(fit: Adjustment) -> float:
     return max(trimmed(view, 0.5) for view in views)
 
 
-def _views(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
-    """All that change whole views: their order, and their axes."""
+def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
+    """All that change whole views: their order, their axes, and rates taken for each other."""
     count, sizes = len(names), [camera.image_size for camera in rig.cameras]
     for moved, order in _orders(count):
         if len({sizes[i] for i in moved}) == 1:
             tracks, clocks = ([one[i] for i in order] for one in (given.tracks, given.clocks))
-            rates = given.rates[order] / given.rates[order[0]]
             how = "swapped" if len(moved) == 2 else "in another order than their cameras"
             what = f"{' and '.join(names[i] for i in moved)} {how}"
-            yield Mistake(what, Footage.of(tracks, None, rates, clocks))
+            yield Mistake(what, Footage.of(tracks, None, given.rates[order], clocks))
     known = {i for i, camera in enumerate(rig.cameras) if camera.is_calibrated}
     for views in (*({i} for i in range(count)), {*range(count)}):
         told, ways = "all views", ["mirrored", "with v counted upwards"]
@@ -576,6 +577,10 @@ def _views(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
                 for i, (track, size) in enumerate(zip(given.tracks, sizes, strict=True))
             ]  # fmt: skip
             yield Mistake(f"{told} {how}", Footage.of(tracks, None, given.rates, given.clocks))
+    for i, (real, stated) in product(range(count), RATES):
+        rates = np.where(np.arange(count) == i, real / stated, 1.0) * given.rates
+        what = f"{names[i]} with {real} frames for {stated} that are supposed"
+        yield Mistake(what, replace(given, rates=rates / rates[0]))
 
 
 def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
@@ -585,16 +590,6 @@ def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
             order = np.arange(count)
             order[[*moved]] = np.roll(moved, turn)
             yield moved, order.tolist()
-
-
-def _rates(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
-    """Frame rates that are taken for each other."""
-    count = len(names)
-    for i in range(count):
-        for real, stated in RATES:
-            rates = np.where(np.arange(count) == i, real / stated, 1.0) * given.rates
-            what = f"{names[i]} with {real} frames for {stated} that are supposed"
-            yield Mistake(what, replace(given, rates=rates / rates[0]))
 
 
 def _dropped(given: Footage, rig: Rig, names: Sequence[str], start: Floats) -> Iterator[Mistake]:
@@ -608,12 +603,12 @@ def _dropped(given: Footage, rig: Rig, names: Sequence[str], start: Floats) -> I
         )
         if min(map(len, tracks)) > 1:
             part = Footage.of(tracks, None, given.rates, clocks)
-            ways += [_jumped(given, given, fit) for fit in Mistake("", part).near(rig, start)]
+            ways += [_jumped(given, given, fit) for fit in _near(part, rig, start)]
     for _ in range(3):  # as what is mended tells the cameras, and these the rest
         if not ways:
             return
         _, lags, found = min(ways, key=lambda way: way[0])
-        ways = [_jumped(given, found, fit) for fit in Mistake("", found).fits(rig, lags)]
+        ways = [_jumped(given, found, fit) for fit in _fits(found, rig, lags)]
     lacking = [np.diff(now - then) for now, then in zip(found.clocks, given.clocks, strict=True)]
     told = [
         f"{missing[k]:.0f} frames dropped of {name} before its frame {k + 1}"
