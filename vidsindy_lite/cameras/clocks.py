@@ -16,6 +16,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_interp_spline
+from scipy.ndimage import minimum_filter1d
 
 from ..arrays import Bools, Floats
 from ..checks import check_items, check_positive, check_times, check_tracks, check_vector, shown
@@ -24,7 +25,7 @@ INSTANTS = 300
 """At which views are compared before all frames are."""
 OVERLAP = 0.5
 """Share of the shorter of two videos that both must show."""
-_NEAR = 4.0  # frames within which a search for lags goes to the best
+_NEAR = 7  # lags around one of which the search goes to the best
 _FARTHEST = 1e9  # frames by which a video may start later; and ...
 _FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
 _ROUNDING = 1e-6  # frames; times that are closer to even ones are even
@@ -122,14 +123,9 @@ def list_lags(lags: Sequence[float] | Floats) -> str:
 
 
 def dips(lags: Floats, missed: Floats) -> list[float]:
-    """Lags at which less is missed than at their neighbours and near by, the lowest first."""
-    padded = np.pad(missed, 1, constant_values=np.inf)
-    low = (missed <= padded[:-2]) & (missed <= padded[2:]) & np.isfinite(missed)
-    kept: list[float] = []
-    for lag in lags[low][np.argsort(missed[low])]:
-        if all(abs(lag - other) >= _NEAR for other in kept):
-            kept.append(float(lag))
-    return kept
+    """Whole lags at which less is missed than at all near by, the lowest first."""
+    low = np.flatnonzero(np.isfinite(missed) & (missed == minimum_filter1d(missed, _NEAR)))
+    return lags[low[np.argsort(missed[low])]].tolist()
 
 
 @dataclass(frozen=True, eq=False)
