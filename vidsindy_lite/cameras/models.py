@@ -303,8 +303,8 @@ class Camera(ABC):
                 f"scale={self.scale}, angle={self.angle}"
             )
         if self.scale is not None and self.angle is not None:
-            self._set(scale=check_positive("scale", self.scale))
-            self._set(angle=check_number("angle", self.angle))
+            scale, angle = check_positive("scale", self.scale), check_number("angle", self.angle)
+            self._set(scale=scale, angle=angle)
         self._set(image_size=check_image_size(self.image_size))
         if self.principal_point is not None:
             point = check_vector("principal_point", self.principal_point, 2)
@@ -313,11 +313,10 @@ class Camera(ABC):
         if not abs(check_number("readout", self.readout)) <= 1:
             raise ValueError(f"readout: must be between -1 and 1 frames, got {self.readout}")
         self._set(readout=float(self.readout))
-        for name in self.errors:
-            error = check_number(name, getattr(self, name))
-            if error < 0:
+        for name, error in self.errors.items():
+            if check_number(name, error) < 0:
                 raise ValueError(f"{name}: must be zero or positive, got {error:g}")
-            self._set(**{name: error})
+            self._set(**{name: float(error)})
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Camera) and self.table == other.table
@@ -436,8 +435,7 @@ class Camera(ABC):
         ValueError
             If the camera is not calibrated, or pixels has a wrong shape or an infinite value.
         """
-        scale, _ = self.calibration
-        return scale * self.turned(check_rows("pixels", pixels, 2)) + self.offset
+        return self.calibration[0] * self.turned(check_rows("pixels", pixels, 2)) + self.offset
 
     # What follows takes its arguments as they are: arrays of floats of the right shape.
 
@@ -451,8 +449,7 @@ class Camera(ABC):
 
     def turned(self, pixels: Floats) -> Floats:
         """Pixels along the axes of the view plane: T(theta) x_c, shape (n, 2)."""
-        _, angle = self.calibration
-        return self.centred(pixels) @ turn(angle).T
+        return self.centred(pixels) @ turn(self.calibration[1]).T
 
     def seen(self, centred: Floats) -> Floats:
         """Pixels at which points x_c of the ideal image are seen through the lens, shape (n, 2)."""
@@ -712,8 +709,7 @@ class PerspectiveCamera(Camera):
     @property
     def focal_length(self) -> float:
         """1 / scale, pixels."""
-        scale, _ = self.calibration
-        return 1 / scale
+        return 1 / self.calibration[0]
 
     def ball_image(self, x: ArrayLike, radius: float) -> tuple[Floats, Floats]:
         """Images of balls: ellipses, whose centres are not the images of the balls' centres.

@@ -506,13 +506,12 @@ def find_mistake(
     names : sequence of str
         What the videos are called.
     """
-    given = Footage.of(tracks, None, rates, clocks)
+    given, found = Footage.of(tracks, None, rates, clocks), list[Mistake]()
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
         begun = _near(given, rig, start)
         left = min(map(_worst, begun), default=np.inf)
         if left <= 2 * DISAGREEMENT:
             return None
-        found: list[Mistake] = []
         # Whole views are not mistaken where most frames agree.
         most = min((fit.left() for fit in begun), default=np.inf) <= 2 * DISAGREEMENT
         for kind in (partial(_dropped, start=start), *(() if most else (_whole,))):
@@ -539,8 +538,7 @@ def find_mistake(
                     alike = tuple(dict.fromkeys(o for o in others if o != one.what))
                     found.append(replace(one, lags=told, before=left, alike=alike))
                     break
-        return min(found, key=lambda one: one.lags.residual, default=None)
-    return None
+    return min(found, key=lambda one: one.lags.residual, default=None)
 
 
 def _worst(fit: Adjustment) -> float:
