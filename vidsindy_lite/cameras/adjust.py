@@ -317,12 +317,8 @@ class Adjustment:
         q, back = q * told[:, None], -ways.swapaxes(1, 2) / np.where(told, size, 1.0)[:, None]
         missed = np.nan_to_num(self.misses)[..., None]
         of_change, of_misses = (q.swapaxes(1, 2) @ part for part in (in_change, missed))
-        return _Reduced(
-            in_change - q @ of_change,
-            (back @ of_misses)[..., 0],
-            back @ of_change,
-            of_misses[..., 0],
-        )
+        own, follow = back @ of_misses, back @ of_change
+        return _Reduced(in_change - q @ of_change, own[..., 0], follow, of_misses[..., 0])
 
     def _slopes(self) -> tuple[Floats, Floats]:
         """Slopes of the misses in the free changes, (n, 2 m, p), and in the points, (n, 2 m, 3)."""

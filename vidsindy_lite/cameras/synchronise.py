@@ -519,7 +519,7 @@ def find_mistake(
                 break
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
             # none.
-            each = {one.what: one for one in kind(given, rig, names)}.values()
+            each = kind(given, rig, names)
             ranked = [(*_paired(one.footage, rig.cameras), one) for one in each]
             ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
             tried = [

@@ -322,18 +322,14 @@ def factorised(
     if not (moved > 5.0**2 * missed).all():
         return None
     middle, _, axes = _spread(images)
-    cameras = [
-        AffineCamera.of(
-            np.sqrt(len(tracks)) * axes[:3, 2 * i : 2 * i + 2].T, middle[2 * i : 2 * i + 2],
-            camera.image_size,
-        )
-        for i, camera in enumerate(rig.cameras)
-    ]  # fmt: skip
+    downs = np.split(np.sqrt(len(tracks)) * axes[:3].T, len(tracks))
+    places, sizes = np.split(middle, len(tracks)), [camera.image_size for camera in rig.cameras]
+    cameras = tuple(map(AffineCamera.of, downs, places, sizes))
     doubts = () if left <= GROSS else (
         f"views agree on one motion but for {left:.2g} pixels of noise: look at the tracks",
     )  # fmt: skip
     told = Lags(best, rates, errors, left, doubts, clocks=films.clocks if clocks else ())
-    return Factorised(Rig(tuple(cameras), note=_NOTE), told, rank)
+    return Factorised(Rig(cameras, note=_NOTE), told, rank)
 
 
 def _least(footage: Footage) -> float:
