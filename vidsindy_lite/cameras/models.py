@@ -56,7 +56,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
-from ..arrays import Bools, Floats
+from ..arrays import Bools, Floats, Ints
 from ..checks import (
     check_array,
     check_image_size,
@@ -529,14 +529,14 @@ def undistorted(points: Floats, coefficients: Floats) -> Floats:
     shown = np.isfinite(points).all(axis=1)
     wanted = points[shown]
 
-    def look(tried: Floats) -> tuple[Floats, Floats]:
+    def look(tried: Floats, which: Ints) -> tuple[Floats, Floats]:
         seen, slope = _lens(tried, coefficients)
         # Where the slope is not positive definite the image turns over: no lens does that.
         good = (slope[:, 0, 0] > 0) & (slope[:, 0, 0] * slope[:, 1, 1] > slope[:, 0, 1] ** 2)
-        return slope, np.where(good[:, None], wanted - seen, np.nan)
+        return slope, np.where(good[:, None], wanted[which] - seen, np.nan)
 
     found, _ = _gauss_newton(look, wanted, _SETTLED)
-    _, missed = look(found)
+    _, missed = look(found, np.arange(len(found)))
     found[~(np.abs(missed).max(axis=1) < np.sqrt(_SETTLED))] = np.nan
     ideal[shown] = found
     return ideal
@@ -837,8 +837,9 @@ def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floa
     x, ended = np.full((len(crossing), 3), np.nan), np.ones(len(crossing), bool)
     seen, visible = seen[crossing], visible[crossing]
 
-    def look(point: Floats) -> tuple[Floats, Floats]:
-        return _stacked(*_reprojection(matrices, scales, seen, point), visible)
+    def look(point: Floats, frames: Ints) -> tuple[Floats, Floats]:
+        slope, missed = _reprojection(matrices, scales, seen[frames], point)
+        return _stacked(slope, missed, visible[frames])
 
     start = _least_squares(left[crossing], right[crossing])
     point, settled = _gauss_newton(look, start, SETTLED)
@@ -939,29 +940,31 @@ def _stacked(left: Floats, right: Floats, visible: Bools) -> tuple[Floats, Float
 
 
 def _gauss_newton(
-    look: Callable[[Floats], tuple[Floats, Floats]], start: Floats, enough: float
+    look: Callable[[Floats, Ints], tuple[Floats, Floats]], start: Floats, enough: float
 ) -> tuple[Floats, Bools]:
     """Points of the least squared misses, each searched by itself, and which of them settled.
 
-    `look(points)` gives the slopes, (n, m, d), and the misses, (n, m); a last step changes these by
-    so little.
+    `look(points, frames)` gives the slopes, (k, m, d), and the misses, (k, m); a last step changes
+    these by so little.
     """
-    point, settled = start.copy(), np.zeros(len(start), bool)
+    point, active = start.copy(), np.arange(len(start))
     part = np.ones(len(start))  # of the step, halved where the whole one leads uphill
-    slope, missed = look(point)
+    slope, missed = look(point, active)
     for _ in range(_STEPS):
-        step = part[:, None] * _least_squares(slope, missed)
+        step = part[active, None] * _least_squares(slope[active], missed[active])
         with np.errstate(all="ignore"):  # lines that hardly cross may send a point far away
-            new_slope, new_missed = look(point + step)
-            new_error, error = np.sum(new_missed**2, axis=1), np.sum(missed**2, axis=1)
-        settled |= np.abs(slope @ step[..., None]).max(axis=(1, 2), initial=0) <= enough
+            new_slope, new_missed = look(point[active] + step, active)
+            new_error, error = np.sum(new_missed**2, axis=1), np.sum(missed[active] ** 2, axis=1)
+        moved = np.abs(slope[active] @ step[..., None]).max(axis=(1, 2), initial=0)
         lower = new_error <= (1 + 1e-12) * error + enough**2  # or equal, but for rounding
-        part = np.where(lower, 1, part / 2)
-        point[lower] += step[lower]
-        slope[lower], missed[lower] = new_slope[lower], new_missed[lower]
-        if settled.all():
+        part[active] = np.where(lower, 1, part[active] / 2)
+        taken = active[lower]
+        point[taken] += step[lower]
+        slope[taken], missed[taken] = new_slope[lower], new_missed[lower]
+        active = active[~(moved <= enough)]
+        if not active.size:
             break
-    return point, settled
+    return point, ~np.isin(np.arange(len(start)), active)
 
 
 def _least_squares(left: Floats, right: Floats) -> Floats:
