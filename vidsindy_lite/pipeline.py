@@ -281,8 +281,8 @@ def _observed(
     if not synchronous:
         mistake = cameras.find_mistake(raw, rig, clock.rates, clock.uneven, begun, names)
         if mistake is not None:  # and is put right, as nothing can be learned with it
-            first, raw = [mistake.text], mistake.tracks
-            clock = clock.mended(mistake.rates, mistake.clocks)
+            first, raw = [mistake.text], mistake.footage.tracks
+            clock = clock.mended(mistake.footage.rates, mistake.footage.clocks)
             lags, start = None, mistake.lags.frames
     with refusing("lags", raw, names):
         if synchronous:

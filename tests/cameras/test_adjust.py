@@ -13,8 +13,6 @@ from vidsindy_lite import study
 from vidsindy_lite.cameras import Lags, learn_cameras, systematic_errors, tracking_errors
 from vidsindy_lite.cameras.adjust import known_to
 
-SEEDS = st.integers(0, 2**32 - 1)
-
 
 def film(seed, cameras=3, n=400, **lens):
     """Generator, rig, path, noisy tracks."""
@@ -23,7 +21,7 @@ def film(seed, cameras=3, n=400, **lens):
     return rng, rig, walk(np.arange(n)), shot(rng, rig, np.arange(n))
 
 
-@given(SEEDS, st.integers(3, 5))
+@given(st.integers(0, 2**32 - 1), st.integers(3, 5))
 @settings(max_examples=4)
 def test_a_rig_measured_by_hand_becomes_as_good_as_the_true_one(seed, cameras):
     rng, rig, x, tracks = film(seed, cameras)
@@ -120,10 +118,7 @@ def test_how_well_a_camera_is_known():
 
 # -------------------------------------------------------------------- errors that all samples share
 
-
 NOISE = 0.05  # pixels
-
-
 STILL = Lags(np.zeros(3), np.ones(3), np.zeros(3), 0.0)
 
 

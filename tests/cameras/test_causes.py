@@ -127,6 +127,10 @@ def swapped(rig, tracks, sampled, rng):
     return [tracks[k] for k in order], f"{VIEWS[i]} and {VIEWS[j]} swapped"
 
 
+def ring(rig, tracks, sampled, rng):
+    return [*tracks[1:], tracks[0]], "A and B and C in another order than their cameras"
+
+
 def flipped(axis, what):
     def flip(rig, tracks, sampled, rng):
         k = int(rng.integers(3))
@@ -155,14 +159,14 @@ def dropped(rig, tracks, sampled, rng):
 
 MISTAKES = {
     "swapped": swapped, "mirrored": flipped(0, "mirrored"), "slow": slow, "dropped": dropped,
-    "upwards": flipped(1, "with v counted upwards"),
+    "upwards": flipped(1, "with v counted upwards"), "ring": ring,
 }  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("cause", "seed", "of"),
     [
-        *((*one, of_a_law) for one in zip(MISTAKES, (1, 2, 2, 504, 1), strict=True)),
+        *((*one, of_a_law) for one in zip(MISTAKES, (1, 2, 2, 504, 1, 5), strict=True)),
         ("dropped", 51, of_a_room),
     ],
 )  # fmt: skip

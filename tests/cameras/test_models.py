@@ -269,7 +269,7 @@ def test_every_power_of_the_radius_folds_where_its_image_is_largest(power, which
         found = undistorted(points, coefficients)
         none = undistorted(np.array([[0.0, 1.001 * largest], [np.nan, 0]]), coefficients)
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), radii, rtol=1e-9)
-    np.testing.assert_allclose(distorted(found, coefficients)[0], points, atol=1e-13)
+    np.testing.assert_allclose(distorted(found, coefficients), points, atol=1e-13)
     assert np.isnan(none).all()
 
 

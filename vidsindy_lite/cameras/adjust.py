@@ -8,7 +8,7 @@ Wanted are the changes p of cameras and clocks (`PARTS`) and the points x of the
 
 smallest: pixels and measurements, each in units of its error. Each step of Gauss and Newton takes
 the points out first: of the slopes in p only what no move of the frame's own point can mimic counts
-(the Schur complement, here by QR). sigma is the noise that the residuals show, robustly; a frame
+(the Schur complement). sigma is the noise that the residuals show, robustly; a frame
 that is missed by more than `_OUTLIER` sigma is weighed down so that it pulls no more the further it
 is off (w = (limit / miss)^2, the weight of Geman and McClure's kind).
 
@@ -97,7 +97,7 @@ _IN_TIME = 1e-4  # ... if clocks move, whose slopes are rough, and in frames
 _LONGEST = 1.0  # frames: further than that, the slope in a lag does not hold
 _PROBE = 1e-6  # of a unit: slopes are taken over twice that, and less is no change
 _BESIDE = 2  # frames around an outlier into which interpolation carries a part of it
-_FLAT = 1e-9  # of the largest pivot; smaller ones leave a point where it is
+_FLAT = 1e-9  # of the largest singular value; in ways of smaller ones a point stays where it is
 # Tried in turn, until a step leads downhill: fine where focal length and distance hardly differ.
 _DAMPING = (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2)
 LAG, DRIFT = PARTS["lag"][0], PARTS["drift"][0]
@@ -162,18 +162,16 @@ def bandwidth(series: Floats) -> float:
 def known_to(given: Camera) -> Floats:
     """Standard errors of a camera of a rig: zero what is exact, infinite what is to be learned."""
     errors = np.zeros(SIZE)
-    errors[PARTS["normal"]] = np.deg2rad(given.normal_error)
-    errors[PARTS["angle"]] = np.deg2rad(given.normal_error) if given.is_calibrated else np.inf
-    errors[PARTS["scale"]] = given.scale_error if given.is_calibrated else np.inf
-    errors[PARTS["position"]] = given.position_error if given.is_placed else np.inf
+    for part in ("scale", "position", "principal point", "distortion", "readout"):
+        errors[PARTS[part]] = getattr(given, f"{part.replace(' ', '_')}_error", 0.0)
+    errors[PARTS["normal"] + PARTS["angle"]] = np.deg2rad(given.normal_error)
+    errors[PARTS["distortion"][2:]] *= _TANGENTIAL
+    if not given.is_calibrated:
+        errors[PARTS["angle"] + PARTS["scale"]] = np.inf
+    if not given.is_placed:
+        errors[PARTS["position"]] = np.inf
     if isinstance(given, OrthographicCamera):
         errors[PARTS["position"][2]] = 0.0  # it sees the same from anywhere on its axis
-    errors[PARTS["principal point"]] = given.principal_point_error
-    if isinstance(given, PerspectiveCamera):
-        errors[PARTS["distortion"]] = given.distortion_error * np.array(
-            [1, 1, _TANGENTIAL, _TANGENTIAL]
-        )
-    errors[PARTS["readout"]] = given.readout_error
     return errors
 
 
@@ -311,21 +309,16 @@ class Adjustment:
 
     @cached_property
     def reduced(self) -> _Reduced:
-        """Slopes in the free changes, with the points taken out by QR."""
+        """Slopes in the free changes, with the points taken out."""
         seen = np.isfinite(self.misses)[..., None]
         in_change, in_points = (np.where(seen, np.nan_to_num(part), 0.0) for part in self._slopes())
-        q, r = np.linalg.qr(in_points)
-        pivots = np.abs(np.diagonal(r, axis1=1, axis2=2))
-        told = pivots.min(axis=1, initial=np.inf) > _FLAT * pivots.max(axis=1, initial=0)
-        q, r = np.where(told[:, None, None], q, 0.0), np.where(told[:, None, None], r, np.eye(3))
+        q, size, ways = np.linalg.svd(in_points, full_matrices=False)
+        told = size > _FLAT * size.max(axis=1, initial=0, keepdims=True)
+        q, back = q * told[:, None], -ways.swapaxes(1, 2) / np.where(told, size, 1.0)[:, None]
         missed = np.nan_to_num(self.misses)[..., None]
         of_change, of_misses = (q.swapaxes(1, 2) @ part for part in (in_change, missed))
-        return _Reduced(
-            in_change - q @ of_change,
-            -np.linalg.solve(r, of_misses)[..., 0],
-            -np.linalg.solve(r, of_change),
-            of_misses[..., 0],
-        )
+        own, follow = back @ of_misses, back @ of_change
+        return _Reduced(in_change - q @ of_change, own[..., 0], follow, of_misses[..., 0])
 
     def _slopes(self) -> tuple[Floats, Floats]:
         """Slopes of the misses in the free changes, (n, 2 m, p), and in the points, (n, 2 m, 3)."""
@@ -355,12 +348,18 @@ class Adjustment:
         return root * np.nan_to_num(self.misses), root[..., None] * self.reduced.slopes
 
     @property
-    def system(self) -> tuple[Floats, Floats]:
-        """Linear equations for a step, of residuals and measurements in units of their errors."""
+    def system(self) -> tuple[Floats, Floats, Floats]:
+        """Linear equations for a step, of residuals and measurements in units of their errors.
+
+        Their columns have length one; the sizes are what they are to be divided by.
+        """
         (missed, slopes), prior = self.weighed, np.sqrt(self.prior)
         sigma = max(self.noise, _PRIOR_NOISE)
         rows = np.vstack((slopes.reshape(-1, len(prior)) / sigma, np.diag(prior)))
-        return rows, -np.append(missed.ravel() / sigma, prior * self.change[self.free])
+        size = np.linalg.norm(rows, axis=0)
+        size[size == 0] = 1.0
+        target = -np.append(missed.ravel() / sigma, prior * self.change[self.free])
+        return rows / size, target, size
 
     @property
     def factor(self) -> Floats:
@@ -372,8 +371,8 @@ class _Reduced(NamedTuple):
     """Slopes, (n, 2 m, p), with the points taken out.
 
     The points move by `own`, (n, 3), to where they are missed least, and with the changes by
-    `follow`, (n, 3, p); a point that its views do not tell stays. `along`, (n, 3), is what of the
-    misses they take up.
+    `follow`, (n, 3, p); where its views do not tell a point it stays. `along`, (n, 3), is what of
+    the misses they take up.
     """
 
     slopes: Floats
@@ -434,11 +433,10 @@ def _downhill(state: Adjustment) -> tuple[Adjustment | None, float]:
     """The state after a step that lessens the errors, and how far it moved images, pixels."""
     free, prior, reduced = state.free, np.sqrt(state.prior), state.reduced
     weights, sigma = state.weights, max(state.noise, _PRIOR_NOISE)
-    rows, target = state.system
-    size = _sizes(rows)
+    rows, target, size = state.system
     if not np.isfinite(size).all():
         return None, np.inf
-    factor, triangle = np.linalg.qr(rows / size)
+    factor, triangle = np.linalg.qr(rows)
     aim = np.append(factor.T @ target, np.zeros(len(size)))
     lags = np.argwhere(free)[:, 1] == LAG
     seen = np.isfinite(state.misses)
@@ -577,19 +575,12 @@ def _causes(near: Adjustment) -> list[Cause]:
     return found
 
 
-def _sizes(rows: Floats) -> Floats:
-    """Lengths of columns, one where they are zero."""
-    size = np.linalg.norm(rows, axis=0)
-    return np.where(size == 0, 1.0, size)
-
-
 def _evidence(near: Adjustment, free: Bools, wanted: Bools) -> tuple[float, float]:
     """T over what chance may make it, zero if it would not matter; pixels that it explains."""
     told, own = free | wanted, (wanted & ~free)[free | wanted]
-    (rows, target), (missed, slopes) = near.system, near.weighed
-    rows, slopes = rows[:, told], slopes[..., told]
-    size = _sizes(rows)
-    step = np.linalg.lstsq(rows / size, target, rcond=1e-10)[0]
+    (rows, target, size), (missed, slopes) = near.system, near.weighed
+    rows, size, slopes = rows[:, told], size[told], slopes[..., told]
+    step = np.linalg.lstsq(rows, target, rcond=1e-10)[0]
     left = missed + slopes @ (step / size)
     share = float(np.linalg.norm(left)) / max(float(np.linalg.norm(missed)), 1e-300)
     factor = fitted_factor(left, slopes, near.prior[told], share * near.noise) * size[:, None]

@@ -31,12 +31,11 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..checks import check_instance
 from .adjust import DRIFT, LAG, PARTS, adjust, known_to
-from .clocks import Footage, Lags, check_clocks
+from .clocks import Footage, Lags
 from .models import (
     ROUNDING,
     Camera,
     all_orthographic,
-    at_once,
     epipolar_lines,
     epipolar_rows,
     independent,
@@ -74,16 +73,15 @@ def _epipolar(tracks: Sequence[Floats], cameras: Sequence[Camera], i: int) -> Eq
     others = [j for j, known in enumerate(cameras) if known.is_calibrated and j != i]
     loose = [j for j in others if not cameras[j].is_placed]
     free = [not camera.is_calibrated] * 2 + [not camera.is_placed] * 2 + [True] * len(loose)
-    values = np.append(camera.scaled_turn, np.zeros(2 + len(loose)))
     parts = [(np.zeros((0, len(free))), np.zeros(0), np.zeros(0, int))]
     for j in others:
-        lines = epipolar_lines(cameras[j].somewhere, tracks[j], camera.somewhere)
+        lines = epipolar_lines(cameras[j], tracks[j], camera)
         design, target = epipolar_rows(lines, camera, tracks[i])
         constants = np.tile(np.equal(loose, j), (len(design), 1))
         moves = np.hstack((lines[0][:, ::-1] * [-1, 1], constants))
         design = np.hstack((design, camera.image_size[0] / 2 * moves))
         told = np.flatnonzero(np.isfinite(design).all(axis=1) & np.isfinite(target))
-        parts.append((design[told], (target - design @ values)[told], told))
+        parts.append((design[told], target[told], told))
     design, target, frames = map(np.concatenate, zip(*parts, strict=True))
     return Equations(design[:, free], target, frames)
 
@@ -241,8 +239,6 @@ def learn_cameras_eq4(tracks: Sequence[Floats], rig: Rig) -> Rig:
         See `learn_cameras`.
     """
     check_learnable(rig)
-    if not rig.is_measured:
-        raise ValueError("rig: Eq. (4) needs all positions, got none; use learn_cameras")
     views, cameras = np.stack(check_views(tracks, rig)), rig.cameras
     known, unknown = ([i for i, c in enumerate(cameras) if c.is_calibrated == k] for k in (1, 0))
     loose = [i for i, camera in enumerate(cameras) if not camera.is_placed]
@@ -346,8 +342,7 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
             "scales and angles may be off; check the positions and normals, or give more of what "
             "is known",
         )
-    measured = (errors > 0) & np.isfinite(errors)
-    off = np.where(measured, np.abs(found.change) / np.where(measured, errors, 1.0), 0.0)
+    off = np.abs(found.change) / np.where(errors > 0, errors, np.inf)
     # Standard errors that a measurement may be off.
     if off.max() > 5.0:
         i, part = np.unravel_index(off.argmax(), off.shape)
@@ -418,14 +413,10 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     errors = np.array([known_to(camera) for camera in rig.cameras])
     moving = (lags.errors > 0) & np.isfinite(lags.errors)
     errors[moving, LAG] = errors[lags.rate_errors > 0, DRIFT] = np.inf
-    clocks = check_clocks(lags.clocks or None, tracks)
-    footage = Footage.of(tracks, lags.frames, lags.rates, clocks)
+    footage = Footage.of(tracks, lags.frames, lags.rates, lags.clocks or None)
     near = adjust(footage, learned.cameras, errors, most=0)
     modes = np.einsum("ik,nji->knj", near.factor, near.reduced.follow)
-    if not rig.note:
-        return modes
-    still = at_once(learned.cameras, footage.aligned)
-    return _of_shape(modes, intersect(learned.cameras, still)[0])
+    return _of_shape(modes, near.points) if rig.note else modes
 
 
 def _of_shape(modes: Floats, x: Floats) -> Floats:

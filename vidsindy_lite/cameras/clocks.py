@@ -16,6 +16,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_interp_spline
+from scipy.ndimage import minimum_filter1d
 
 from ..arrays import Bools, Floats
 from ..checks import check_items, check_positive, check_times, check_tracks, check_vector, shown
@@ -24,7 +25,7 @@ INSTANTS = 300
 """At which views are compared before all frames are."""
 OVERLAP = 0.5
 """Share of the shorter of two videos that both must show."""
-_NEAR = 4.0  # frames within which a search for lags goes to the best
+_NEAR = 7  # lags around one of which the search goes to the best
 _FARTHEST = 1e9  # frames by which a video may start later; and ...
 _FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
 _ROUNDING = 1e-6  # frames; times that are closer to even ones are even
@@ -113,10 +114,7 @@ def align(
         If a track has a wrong shape or an infinite value, or there is not one finite lag, positive
         rate, or increasing clock, per track, or a lag or rate is absurdly large or small.
     """
-    tracks = check_tracks(tracks)
-    shifts = check_lags("lags", lags, len(tracks))
-    speeds = check_rates(rates, len(tracks))
-    return Footage.of(tracks, shifts, speeds, check_clocks(clocks, tracks)).aligned
+    return Footage.of(check_tracks(tracks), lags, rates, clocks).aligned
 
 
 def list_lags(lags: Sequence[float] | Floats) -> str:
@@ -125,14 +123,9 @@ def list_lags(lags: Sequence[float] | Floats) -> str:
 
 
 def dips(lags: Floats, missed: Floats) -> list[float]:
-    """Lags at which less is missed than at their neighbours and near by, the lowest first."""
-    padded = np.pad(missed, 1, constant_values=np.inf)
-    low = (missed <= padded[:-2]) & (missed <= padded[2:]) & np.isfinite(missed)
-    kept: list[float] = []
-    for lag in lags[low][np.argsort(missed[low])]:
-        if all(abs(lag - other) >= _NEAR for other in kept):
-            kept.append(float(lag))
-    return kept
+    """Whole lags at which less is missed than at all near by, the lowest first."""
+    low = np.flatnonzero(np.isfinite(missed) & (missed == minimum_filter1d(missed, _NEAR)))
+    return lags[low[np.argsort(missed[low])]].tolist()
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,15 +201,19 @@ class Footage:
     def of(
         cls,
         tracks: Sequence[Floats],
-        lags: Floats | None = None,
-        rates: Floats | None = None,
-        clocks: Sequence[Floats] | None = None,
+        lags: ArrayLike | None = None,
+        rates: ArrayLike | None = None,
+        clocks: Sequence[ArrayLike] | None = None,
     ) -> Footage:
-        """Of what was checked; by default the tracks are at the same instants already."""
-        ticks, still = clocks or check_clocks(None, tracks), np.zeros(len(tracks))
-        curves = tuple(map(Curve, tracks, ticks))
-        shifts, speeds = still if lags is None else lags, still + 1 if rates is None else rates
-        return cls(curves, ticks[0], shifts, speeds)
+        """Of checked tracks; by default they are at the same instants already."""
+        curves = tuple(map(Curve, tracks, check_clocks(clocks, tracks)))
+        shifts = check_lags("lags", lags, len(tracks))
+        return cls(curves, curves[0].clock, shifts, check_rates(rates, len(tracks)))
+
+    @property
+    def tracks(self) -> tuple[Floats, ...]:
+        """Of each video, frame by frame."""
+        return tuple(curve.track for curve in self.curves)
 
     @property
     def clocks(self) -> tuple[Floats, ...]:
@@ -241,8 +238,7 @@ class Footage:
     @cached_property
     def aligned(self) -> tuple[Floats, ...]:
         """The tracks at the instants, (n, 2)."""
-        frames = map(self.frames, range(len(self.curves)))
-        return tuple(curve.at(at) for curve, at in zip(self.curves, frames, strict=True))
+        return tuple(curve.at(self.frames(i)) for i, curve in enumerate(self.curves))
 
     @property
     def some(self) -> Footage:
@@ -269,9 +265,9 @@ class Footage:
         return lag, lag * ((self.instants - self.middle) / self.span)[:, None]
 
 
-def check_lags(name: str, lags: ArrayLike, count: int) -> Floats:
+def check_lags(name: str, lags: ArrayLike | None, count: int) -> Floats:
     """One lag per video, counted from the first one's."""
-    checked = check_vector(name, lags, count)
+    checked = np.zeros(count) if lags is None else check_vector(name, lags, count)
     far = np.abs(checked).max()
     if far > _FARTHEST:
         raise ValueError(f"{name}: must be at most {_FARTHEST:g} frames, got {far:g}")
@@ -352,18 +348,16 @@ class Clock:
         """
         if not (isinstance(t, list | tuple) and len(t) == len(tracks) and np.ndim(t[0])):
             times = _one_each(cast("ArrayLike", t), len(tracks[0]), "row of tracks[0]")
-            even = [np.arange(len(track), dtype=float) for track in tracks]
-            return cls(times, np.ones(len(tracks)), even)
+            return cls(times, np.ones(len(tracks)), check_clocks(None, tracks))
         stated = [
             _one_each(one, len(track), f"row of tracks[{i}]")
             for i, (one, track) in enumerate(zip(t, tracks, strict=True))
         ]
         usual = np.array([np.median(np.diff(times)) if len(times) > 1 else 1 for times in stated])
         frames = [(times - times[0]) / step for times, step in zip(stated, usual, strict=True)]
-        whole = [np.rint(one) for one in frames]  # if they are, but for rounding
-        near = [np.abs(a - b).max() < _ROUNDING for a, b in zip(frames, whole, strict=True)]
-        rounded = [a if close else b for close, a, b in zip(near, whole, frames, strict=True)]
-        return cls(stated[0], usual[0] / usual, rounded)
+        even = [np.abs(one - np.rint(one)).max() < _ROUNDING for one in frames]
+        frames = [np.rint(one) if near else one for near, one in zip(even, frames, strict=True)]
+        return cls(stated[0], usual[0] / usual, frames)
 
     @classmethod
     def of_videos(

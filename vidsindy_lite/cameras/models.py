@@ -303,8 +303,8 @@ class Camera(ABC):
                 f"scale={self.scale}, angle={self.angle}"
             )
         if self.scale is not None and self.angle is not None:
-            self._set(scale=check_positive("scale", self.scale))
-            self._set(angle=check_number("angle", self.angle))
+            scale, angle = check_positive("scale", self.scale), check_number("angle", self.angle)
+            self._set(scale=scale, angle=angle)
         self._set(image_size=check_image_size(self.image_size))
         if self.principal_point is not None:
             point = check_vector("principal_point", self.principal_point, 2)
@@ -313,23 +313,34 @@ class Camera(ABC):
         if not abs(check_number("readout", self.readout)) <= 1:
             raise ValueError(f"readout: must be between -1 and 1 frames, got {self.readout}")
         self._set(readout=float(self.readout))
-        for name in self.errors:
-            error = check_number(name, getattr(self, name))
-            if error < 0:
+        for name, error in self.errors.items():
+            if check_number(name, error) < 0:
                 raise ValueError(f"{name}: must be zero or positive, got {error:g}")
-            self._set(**{name: error})
+            self._set(**{name: float(error)})
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Camera) and self._values == other._values
+        return isinstance(other, Camera) and self.table == other.table
 
     def __hash__(self) -> int:
-        return hash(self._values)
+        return hash((self.model, self.image_size))
 
     @property
-    def _values(self) -> tuple[object, ...]:
-        parts = (getattr(self, part.name) for part in fields(self))
-        plain = (p.tolist() if isinstance(p, np.ndarray) else p for p in parts)
-        return self.model, *(tuple(p) if isinstance(p, list) else p for p in plain)
+    def table(self) -> dict[str, object]:
+        """Its model and plain numbers, under the keys of a rig file; defaults are left out."""
+        plain = type(self) is OrthographicCamera
+        known: dict[str, object] = {} if plain else {"model": self.model}
+        for part in fields(self):
+            value = getattr(self, part.name)
+            default = isinstance(value, float) and value == part.default
+            free = part.name in ("normal", "angle") and not self.is_measured
+            if value is not None and not (default or free):
+                known[part.name] = np.asarray(value).tolist()
+        return known
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether something is known of where it stands, or where it looks."""
+        return isinstance(self, OrthographicCamera) or self.is_placed
 
     def _set(self, **values: object) -> None:
         self.__dict__.update(values)
@@ -356,18 +367,6 @@ class Camera(ABC):
         if self.scale is None or self.angle is None:
             raise ValueError("camera: scale and angle must be known, got None; see learn_cameras")
         return self.scale, self.angle
-
-    @property
-    def scaled_turn(self) -> Floats:
-        """(s cos theta, s sin theta); zero if they are unknown."""
-        if self.scale is None or self.angle is None:
-            return np.zeros(2)
-        return self.scale * np.array([np.cos(self.angle), np.sin(self.angle)])
-
-    @property
-    def somewhere(self) -> Self:
-        """The same camera with a position: its own, or any."""
-        return self if self.is_placed else self.placed(np.zeros(2))
 
     @cached_property
     def rows(self) -> Floats:
@@ -436,8 +435,7 @@ class Camera(ABC):
         ValueError
             If the camera is not calibrated, or pixels has a wrong shape or an infinite value.
         """
-        scale, _ = self.calibration
-        return scale * self.turned(check_rows("pixels", pixels, 2)) + self.offset
+        return self.calibration[0] * self.turned(check_rows("pixels", pixels, 2)) + self.offset
 
     # What follows takes its arguments as they are: arrays of floats of the right shape.
 
@@ -451,13 +449,12 @@ class Camera(ABC):
 
     def turned(self, pixels: Floats) -> Floats:
         """Pixels along the axes of the view plane: T(theta) x_c, shape (n, 2)."""
-        _, angle = self.calibration
-        return self.centred(pixels) @ turn(angle).T
+        return self.centred(pixels) @ turn(self.calibration[1]).T
 
     def seen(self, centred: Floats) -> Floats:
         """Pixels at which points x_c of the ideal image are seen through the lens, shape (n, 2)."""
         u, v = self.centre
-        bent = self._bent(centred)
+        bent = self._through(distorted, centred)
         return np.column_stack((u + bent[:, 0], v - self.aspect * bent[:, 1]))
 
     def centred(self, pixels: Floats) -> Floats:
@@ -466,7 +463,8 @@ class Camera(ABC):
         Shape (n, 2). Of a camera that is not calibrated, without its distortion.
         """
         u, v = self.centre
-        return self._unbent(np.column_stack((pixels[:, 0] - u, (v - pixels[:, 1]) / self.aspect)))
+        bent = np.column_stack((pixels[:, 0] - u, (v - pixels[:, 1]) / self.aspect))
+        return self._through(undistorted, bent)
 
     @property
     def centre(self) -> tuple[float, float]:
@@ -476,12 +474,8 @@ class Camera(ABC):
         width, height = self.image_size
         return (width - 1) / 2, (height - 1) / 2
 
-    def _bent(self, centred: Floats) -> Floats:
-        """What the lens makes of an ideal image."""
-        return centred
-
-    def _unbent(self, centred: Floats) -> Floats:
-        """The ideal image of what is seen."""
+    def _through(self, lens: Callable[[Floats, Floats], Floats], centred: Floats) -> Floats:
+        """What the lens makes of an ideal image, or the ideal image of what is seen."""
         return centred
 
     def steadied(self, track: Floats) -> Floats:
@@ -498,16 +492,15 @@ class Camera(ABC):
 
     def calibrated(self, turned: complex) -> Self:
         """The same camera with s exp(i theta)."""
-        twin = copy(self)  # and what was computed of it: none of that hangs on scale or angle
-        twin._set(scale=float(abs(turned)), angle=float(np.angle(turned)))
-        return twin
+        return self.moved(scale=float(abs(turned)), angle=float(np.angle(turned)))
 
     def moved(self, **values: object) -> Self:
         """The same camera with values that need no check: a search builds very many."""
         twin = copy(self)
         twin._set(**values)
-        for name in ("rows", "offset", "matrix") if "normal" in values else ("offset", "matrix"):
-            twin.__dict__.pop(name, None)
+        if not values.keys().isdisjoint(("normal", "position")):
+            for name in ("rows", "offset", "matrix"):
+                twin.__dict__.pop(name, None)
         return twin
 
     def placed(self, offset: Floats) -> Self:
@@ -532,25 +525,29 @@ def undistorted(points: Floats, coefficients: Floats) -> Floats:
 
     NaN where the model shows none: beyond the circle in which its images do not overlap.
     """
-    ideal = points.copy()
-    missed = np.zeros_like(points)
-    for _ in range(_STEPS):
-        seen, slope = distorted(ideal, coefficients)
-        missed = points - seen
-        with np.errstate(over="ignore", invalid="ignore"):
-            determinant = slope[:, 0, 0] * slope[:, 1, 1] - slope[:, 0, 1] ** 2
-        folded = ~(determinant > 0)  # the image turns over there: no lens does that
-        missed[folded] = np.nan
-        slope[folded] = np.eye(2)
-        step = np.linalg.solve(slope, missed[..., None])[..., 0]
-        ideal = ideal + step
-        if not np.nanmax(np.abs(step), initial=0.0) > _SETTLED:
-            break
-    ideal[~(np.abs(missed).max(axis=1, initial=0.0) < np.sqrt(_SETTLED))] = np.nan
+    ideal = np.full_like(points, np.nan)
+    shown = np.isfinite(points).all(axis=1)
+    wanted = points[shown]
+
+    def look(tried: Floats, which: Ints) -> tuple[Floats, Floats]:
+        seen, slope = _lens(tried, coefficients)
+        # Where the slope is not positive definite the image turns over: no lens does that.
+        good = (slope[:, 0, 0] > 0) & (slope[:, 0, 0] * slope[:, 1, 1] > slope[:, 0, 1] ** 2)
+        return slope, np.where(good[:, None], wanted[which] - seen, np.nan)
+
+    found, _ = _gauss_newton(look, wanted, _SETTLED)
+    _, missed = look(found, np.arange(len(found)))
+    found[~(np.abs(missed).max(axis=1) < np.sqrt(_SETTLED))] = np.nan
+    ideal[shown] = found
     return ideal
 
 
-def distorted(points: Floats, coefficients: Floats) -> tuple[Floats, Floats]:
+def distorted(points: Floats, coefficients: Floats) -> Floats:
+    """Where points of the ideal image, (n, 2), are seen through the lens."""
+    return _lens(points, coefficients)[0]
+
+
+def _lens(points: Floats, coefficients: Floats) -> tuple[Floats, Floats]:
     """Where points of the ideal image, (n, 2), are seen through the lens; slopes, (n, 2, 2)."""
     if not len(points):  # which OpenCV refuses
         return points, np.zeros((0, 2, 2))
@@ -689,16 +686,10 @@ class PerspectiveCamera(Camera):
             size = USUAL if len(given) <= USUAL else len(LENS)
             self._set(distortion=frozen(np.pad(given, (0, size - len(given)))))
 
-    def _bent(self, centred: Floats) -> Floats:
-        if self.distortion is None:
-            return centred
-        scale, _ = self.calibration
-        return distorted(scale * centred * _DOWN, self.distortion)[0] * _DOWN / scale
-
-    def _unbent(self, centred: Floats) -> Floats:
+    def _through(self, lens: Callable[[Floats, Floats], Floats], centred: Floats) -> Floats:
         if self.distortion is None or self.scale is None:
             return centred
-        return undistorted(self.scale * centred * _DOWN, self.distortion) * _DOWN / self.scale
+        return lens(self.scale * centred * _DOWN, self.distortion) * _DOWN / self.scale
 
     @property
     def _last_row(self) -> Floats:
@@ -718,8 +709,7 @@ class PerspectiveCamera(Camera):
     @property
     def focal_length(self) -> float:
         """1 / scale, pixels."""
-        scale, _ = self.calibration
-        return 1 / scale
+        return 1 / self.calibration[0]
 
     def ball_image(self, x: ArrayLike, radius: float) -> tuple[Floats, Floats]:
         """Images of balls: ellipses, whose centres are not the images of the balls' centres.
@@ -766,13 +756,9 @@ class PerspectiveCamera(Camera):
         stretch = (along - across) / np.where(squared > 0, squared, 1)
         shapes = across[:, None, None] * np.eye(2) + stretch[:, None, None] * outer
         centres = out * (depth**2 / clear)[:, None]
-        return self.seen(centres), self._slope(centres) @ shapes @ np.diag(_DOWN)
-
-    def _slope(self, centred: Floats) -> Floats:
-        """Slope of `seen`, (n, 2, 2): what the lens makes of small shapes."""
-        steps = np.eye(2)  # pixels
-        ends = [(self.seen(centred + e) - self.seen(centred - e)) / 2 for e in steps]
-        return np.stack(ends, axis=-1)
+        # What the lens makes of small shapes, by steps of a pixel.
+        ends = [(self.seen(centres + e) - self.seen(centres - e)) / 2 for e in np.eye(2)]
+        return self.seen(centres), np.stack(ends, axis=-1) @ shapes @ np.diag(_DOWN)
 
 
 MODELS: dict[str, Any] = {
@@ -846,11 +832,9 @@ def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floa
     visible = np.asarray(np.isfinite(seen).all(axis=-1))
     seen = np.where(visible[..., None], seen, 0)
 
-    left, right = _stacked(*_lines(matrices, scales, seen), visible)
+    left, right = _stacked(*_lines(matrices, scales[:, None] * seen), visible)
     crossing = (np.linalg.svd(left, compute_uv=False) > PARALLEL).sum(axis=1) == 3
     x, ended = np.full((len(crossing), 3), np.nan), np.ones(len(crossing), bool)
-    if not crossing.any():
-        return x, ended
     seen, visible = seen[crossing], visible[crossing]
 
     def look(point: Floats, frames: Ints) -> tuple[Floats, Floats]:
@@ -858,7 +842,7 @@ def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floa
         return _stacked(slope, missed, visible[frames])
 
     start = _least_squares(left[crossing], right[crossing])
-    point, settled = _gauss_newton(look, start)
+    point, settled = _gauss_newton(look, start, SETTLED)
     depth = point @ matrices[:, 2, :3].T + matrices[:, 2, 3]
     point[(visible & (depth <= 0)).any(axis=1)] = np.nan
     x[crossing], ended[crossing] = point, settled
@@ -881,7 +865,7 @@ def epipolar_lines(known: Camera, pixels: Floats, unknown: Camera) -> tuple[Floa
     pixels : ndarray, shape (n, 2)
         Where the known camera sees some points.
     unknown : Camera
-        Its scale and angle are not used.
+        Its scale and angle are not used. One without a position, of these two, is anywhere.
 
     Returns
     -------
@@ -891,24 +875,23 @@ def epipolar_lines(known: Camera, pixels: Floats, unknown: Camera) -> tuple[Floa
     constants : ndarray, shape (n,)
         h x g in the same unit: scene units, or for a perspective camera those at distance 1.
     """
-    normals, constants = np.full((len(pixels), 2), np.nan), np.full(len(pixels), np.nan)
-    seen = np.isfinite(pixels).all(axis=1)
-    scale = np.array([known.calibration[0]])
-    left, right = _lines(known.matrix[None], scale, known.turned(pixels[seen])[:, None])
-    left, right = left[:, 0], right[:, 0]
-    direction = np.cross(left[:, 0], left[:, 1])
+    known, unknown = (c if c.is_placed else c.placed(np.zeros(2)) for c in (known, unknown))
+    plane = known.calibration[0] * known.turned(pixels)[:, None]
+    left, right = (part[:, 0] for part in _lines(known.matrix[None], plane))
+    one, other = left[:, 0], left[:, 1]
+    direction = np.cross(one, other)
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    on_line = (np.linalg.pinv(left) @ right[..., None])[..., 0]
+    # The point of each line that is closest to the origin.
+    closest = right[:, :1] * np.cross(other, direction) + right[:, 1:] * np.cross(direction, one)
+    on_line = closest / np.linalg.norm(np.cross(one, other), axis=1, keepdims=True)
     linear, constant = np.split(unknown.matrix, [3], axis=1)
     g, h = on_line @ linear.T + constant[:, 0], direction @ linear.T
-    across = g[:, 2:] * h[:, :2] - h[:, 2:] * g[:, :2]
-    size = np.linalg.norm(across, axis=1)
+    line = np.cross(g, h)  # of homogeneous image points
+    size = np.linalg.norm(line[:, :2], axis=1)
     reach = np.abs(g[:, 2]) + np.abs(h[:, 2]) * np.linalg.norm(g[:, :2], axis=1)
-    good = size > PARALLEL * reach
-    told = np.flatnonzero(seen)[good]
-    normals[told] = across[good] / size[good, None]
-    constants[told] = (h[good, 0] * g[good, 1] - h[good, 1] * g[good, 0]) / size[good]
-    return normals, constants
+    line[~(size > PARALLEL * reach)] = np.nan
+    line /= size[:, None]
+    return line[:, 1::-1] * [1, -1], -line[:, 2]
 
 
 def epipolar_rows(
@@ -917,23 +900,26 @@ def epipolar_rows(
     """Linear equations for scale and angle of a camera from `epipolar_lines` and its own pixels.
 
     s T (X, Y) = [[X, Y], [Y, -X]] (s cos theta, s sin theta). Of pixels (..., n, 2) the design, in
-    pixels, in the same shape, and the target, (..., n); NaN where there is no line or pixel.
+    pixels, in the same shape, and the target, (..., n), or what a calibrated camera leaves of it;
+    NaN where there is no line or pixel.
     """
     normals, constants = lines
     (a, b), centred = normals.T, camera.centred(pixels.reshape(-1, 2)).reshape(pixels.shape)
     x, y = centred[..., 0], centred[..., 1]
     design = np.stack((a * y - b * x, -a * x - b * y), axis=-1)
-    return design, np.broadcast_to(constants, x.shape)
+    if not camera.is_calibrated:
+        return design, np.broadcast_to(constants, x.shape)
+    scale, angle = camera.calibration
+    return design, constants - design @ (scale * np.array([np.cos(angle), np.sin(angle)]))
 
 
-def _lines(matrices: Floats, scales: Floats, turned: Floats) -> tuple[Floats, Floats]:
-    """Equations left @ x = right of the lines of sight at T x_c, scene units.
+def _lines(matrices: Floats, plane: Floats) -> tuple[Floats, Floats]:
+    """Equations left @ x = right of the lines of sight at s T x_c, scene units.
 
-    From (m, 3, 4), (m,) and (n, m, 2) to (n, m, 2, 3) and (n, m, 2).
+    From (m, 3, 4) and (n, m, 2) to (n, m, 2, 3) and (n, m, 2).
     """
-    seen = scales[:, None] * turned
-    left = matrices[:, :2, :3] - seen[..., None] * matrices[:, None, 2, :3]
-    return left, seen * matrices[:, 2, 3, None] - matrices[:, :2, 3]
+    left = matrices[:, :2, :3] - plane[..., None] * matrices[:, None, 2, :3]
+    return left, plane * matrices[:, 2, 3, None] - matrices[:, :2, 3]
 
 
 def _reprojection(
@@ -942,7 +928,7 @@ def _reprojection(
     """Slope of the T x_c at which points are seen, (n, m, 2, 3), and how far it is off."""
     image = np.moveaxis(x @ matrices[:, :, :3].swapaxes(1, 2), 0, 1) + matrices[:, :, 3]
     plane, depth = image[..., :2] / image[..., 2:], image[..., 2, None, None]
-    slope = matrices[:, :2, :3] - plane[..., None] * matrices[:, None, 2, :3]
+    slope, _ = _lines(matrices, plane)
     return slope / (scales[:, None, None] * depth), turned - plane / scales[:, None]
 
 
@@ -954,11 +940,12 @@ def _stacked(left: Floats, right: Floats, visible: Bools) -> tuple[Floats, Float
 
 
 def _gauss_newton(
-    look: Callable[[Floats, Ints], tuple[Floats, Floats]], start: Floats
+    look: Callable[[Floats, Ints], tuple[Floats, Floats]], start: Floats, enough: float
 ) -> tuple[Floats, Bools]:
     """Points of the least squared misses, each searched by itself, and which of them settled.
 
-    `look(points, frames)` gives the slopes, (k, 2 m, 3), and the misses, (k, 2 m).
+    `look(points, frames)` gives the slopes, (k, m, d), and the misses, (k, m); a last step changes
+    these by so little.
     """
     point, active = start.copy(), np.arange(len(start))
     part = np.ones(len(start))  # of the step, halved where the whole one leads uphill
@@ -969,23 +956,19 @@ def _gauss_newton(
             new_slope, new_missed = look(point[active] + step, active)
             new_error, error = np.sum(new_missed**2, axis=1), np.sum(missed[active] ** 2, axis=1)
         moved = np.abs(slope[active] @ step[..., None]).max(axis=(1, 2), initial=0)
-        lower = new_error <= (1 + 1e-12) * error + SETTLED**2  # or equal, but for rounding
+        lower = new_error <= (1 + 1e-12) * error + enough**2  # or equal, but for rounding
         part[active] = np.where(lower, 1, part[active] / 2)
         taken = active[lower]
         point[taken] += step[lower]
         slope[taken], missed[taken] = new_slope[lower], new_missed[lower]
-        active = active[~(moved <= SETTLED)]
+        active = active[~(moved <= enough)]
         if not active.size:
             break
     return point, ~np.isin(np.arange(len(start)), active)
 
 
 def _least_squares(left: Floats, right: Floats) -> Floats:
-    """Solutions of many small systems; zero where one is singular: a point that ran far away."""
-    q, r = np.linalg.qr(left)
-    pivots = np.abs(np.diagonal(r, axis1=1, axis2=2))
-    singular = ~(pivots.min(axis=1) > PARALLEL**2 * pivots.max(axis=1))
-    r[singular] = np.eye(3)
-    x = np.linalg.solve(r, q.swapaxes(1, 2) @ right[..., None])[..., 0]
-    x[singular] = 0
-    return x
+    """Solutions of many small systems; zero where numbers overflow: a point that ran far away."""
+    whole = np.isfinite(left).all(axis=(1, 2), keepdims=True)
+    inverse = np.linalg.pinv(np.where(whole, left, 0.0), rcond=PARALLEL**2)
+    return (inverse @ right[..., None])[..., 0]

@@ -37,9 +37,9 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import rq
 from scipy.spatial.transform import Rotation
 
 from ..arrays import Floats
@@ -99,17 +99,29 @@ _MEASURED = """\
 # Cameras stand still. Errors are those of a tape and of the eye: one standard deviation each; the
 # videos then tell better. Without its error, a number is taken as exact.
 """
-_SCALE = "scale = 0.005    # scene units per pixel: length of an object over its pixels"
-_ANGLE = """\
+_FLAT = """
+[[camera]]
+position = [{place}]    # of the camera, or a landmark in the middle of its image
+normal = [{normal}]    # from the scene to the camera; any length
+image_size = [{width}, {height}]
+"""
+_FIRST = """\
+scale = 0.005    # scene units per pixel: length of an object over its pixels
 angle = {angle:.3f}    # radians: for this normal and the z axis upright in the image; add how
-                  # far the z axis is turned anticlockwise there"""
-_BY_HAND = """\
+                  # far the z axis is turned anticlockwise there
+"""
+_BY_HAND = """
+[[camera]]
+model = "perspective"
+position = [{place}]    # of its lens
+image_size = [{width}, {height}]
 looks_at = [0.000, 0.000, 0.000]    # what stands in the middle of its image (or give normal)
 field_of_view = 60    # degrees across the width of the video (or give scale and angle)
 roll = 0    # degrees by which the z axis leans to the left in its image; 0 for a level camera
 position_error = 0.03    # metres in each direction
 normal_error = 2    # degrees, of where it looks and of its roll
-scale_error = 0.03    # share of the focal length: 3 %"""
+scale_error = 0.03    # share of the focal length: 3 %
+"""
 _LOOKS = ("looks_at", "field_of_view", "roll")  # keys that a hand can measure
 _NAMES = {
     "K": ("k", "matrix", "camera_matrix", "cameramatrix", "intrinsics", "intrinsic_matrix", "mtx"),
@@ -199,7 +211,7 @@ class Rig:
 
     def _check_measured(self) -> None:
         """That of perspective cameras all have a place, or none; a distance is for the latter."""
-        loose = [not isinstance(c, OrthographicCamera) and not c.is_placed for c in self.cameras]
+        loose = [not camera.is_measured for camera in self.cameras]
         if any(loose) and not all(loose):
             raise ValueError(
                 "cameras: must all have a position, or none if all are perspective, got none of "
@@ -221,7 +233,7 @@ class Rig:
     @property
     def is_measured(self) -> bool:
         """Whether something is known of where the cameras stand, or where they look."""
-        return any(isinstance(c, OrthographicCamera) or c.is_placed for c in self.cameras)
+        return any(camera.is_measured for camera in self.cameras)
 
     @classmethod
     def around(cls, x: ArrayLike, image_size: tuple[int, int] = (512, 512)) -> Rig:
@@ -330,7 +342,7 @@ class Rig:
         for camera in self.cameras:
             lines += ["", "[[camera]]"]
             # repr of a float is its shortest exact decimal form, and valid TOML.
-            lines += [f"{key} = {value!r}" for key, value in _to_table(camera).items()]
+            lines += [f"{key} = {value!r}" for key, value in camera.table.items()]
         return "\n".join(lines) + "\n"
 
     def uncalibrated(self, keep: int = 0) -> Rig:
@@ -497,23 +509,17 @@ def rig_template(
     check_choice("model", model, [OrthographicCamera.model, PerspectiveCamera.model])
     width, height = check_image_size(image_size)
     flat = model == OrthographicCamera.model
-    parts = [_HEAD + (_STILL if flat else _MEASURED)]
+    text = _HEAD + (_STILL if flat else _MEASURED)
     for i in range(cameras):
         # Of two cameras, one is a third of a turn from the other: face to face both see the same.
         azimuth = 2 * np.pi * i / max(cameras, 3) + np.deg2rad(20)
         normal, upright = _looking_down(azimuth, np.deg2rad(20))
-        place, size = f"position = [{decimals(3 * normal)}]", f"image_size = [{width}, {height}]"
-        if flat:
-            lines = [
-                f"{place}    # of the camera, or a landmark in the middle of its image",
-                f"normal = [{decimals(normal)}]    # from the scene to the camera; any length",
-                size,
-                *((_SCALE, _ANGLE.format(angle=upright)) if i == 0 else ()),
-            ]
-        else:
-            lines = [f'model = "{model}"', f"{place}    # of its lens", size, _BY_HAND]
-        parts.append("\n".join(["[[camera]]", *lines]) + "\n")
-    return "\n".join(parts)
+        camera = _BY_HAND if not flat else _FLAT if i else _FLAT + _FIRST
+        text += camera.format(
+            place=decimals(3 * normal), normal=decimals(normal), angle=upright, width=width,
+            height=height,
+        )  # fmt: skip
+    return text
 
 
 def _looking_down(azimuth: float, elevation: float) -> tuple[Floats, float]:
@@ -523,29 +529,28 @@ def _looking_down(azimuth: float, elevation: float) -> tuple[Floats, float]:
     return normal, np.arctan2(-np.cos(azimuth), -np.sin(azimuth))
 
 
-def _by_hand(table: dict[str, Any], model: str) -> dict[str, Any]:
+def _by_hand(known: dict[str, Any], model: str) -> dict[str, Any]:
     """A table with normal, scale and angle in place of what a hand measures."""
-    known = {key: value for key, value in table.items() if key not in _LOOKS}
-    if "looks_at" in table:
-        if "normal" in table or "position" not in table:
+    aim, across, roll = (known.pop(key, None) for key in _LOOKS)
+    if aim is not None:
+        if "normal" in known or "position" not in known:
             raise ValueError("looks_at: must be given with a position and without a normal")
-        position = check_vector("position", table["position"], 3)
-        known["normal"] = position - check_vector("looks_at", table["looks_at"], 3)
-    if "field_of_view" in table:
-        if model == OrthographicCamera.model or "scale" in table or "angle" in table:
+        position = check_vector("position", known["position"], 3)
+        known["normal"] = position - check_vector("looks_at", aim, 3)
+    if across is not None:
+        if model == OrthographicCamera.model or "scale" in known or "angle" in known:
             raise ValueError(
                 "field_of_view: must be given in place of scale and angle, perspective"
             )
-        width = check_image_size(table.get("image_size", Camera.image_size))[0]
-        across = check_number("field_of_view", table["field_of_view"])
-        if not 0 < across < 180:
+        width = check_image_size(known.get("image_size", Camera.image_size))[0]
+        if not 0 < check_number("field_of_view", across) < 180:
             raise ValueError(f"field_of_view: must be between 0 and 180 degrees, got {across:g}")
         known["scale"] = 2 * np.tan(np.deg2rad(across) / 2) / width
-        roll = check_number("roll", table.get("roll", 0.0))
+        leans = check_number("roll", 0.0 if roll is None else roll)
         if "normal" in known:
             x, y = rotation_to_z(known["normal"])[:2, 2]
-            known["angle"] = float(np.arctan2(x, y) + np.deg2rad(roll))
-    elif "roll" in table:
+            known["angle"] = float(np.arctan2(x, y) + np.deg2rad(leans))
+    elif roll is not None:
         raise ValueError("roll: must be given with a field_of_view")
     return known
 
@@ -553,19 +558,6 @@ def _by_hand(table: dict[str, Any], model: str) -> dict[str, Any]:
 def decimals(values: Floats) -> str:
     """Three decimals of each number."""
     return ", ".join(f"{value:.3f}" for value in values)
-
-
-def _to_table(camera: Camera) -> dict[str, object]:
-    """A camera as plain numbers under the keys of the file; defaults are left out."""
-    known = {} if type(camera) is OrthographicCamera else {"model": camera.model}
-    for part in fields(camera):
-        value = getattr(camera, part.name)
-        default = isinstance(value, float) and value == part.default
-        if value is not None and not default:
-            known[part.name] = value
-    if not isinstance(camera, OrthographicCamera) and not camera.is_placed:
-        known = {key: value for key, value in known.items() if key not in ("normal", "angle")}
-    return {key: np.asarray(value).tolist() for key, value in known.items()}
 
 
 def _from_table(index: int, table: object) -> Camera:
@@ -623,11 +615,10 @@ def read_calibration(
         raise ValueError(f"paths: must be a list of files, got {shown(paths)}")
     for given in paths:
         path = check_file("paths", given, "calibration file")
-        content = _content(path)
-        before = len(warnings)
+        content, told = _content(path), list[str]()
         with reading("paths", path):
-            found = list(_cameras(content, size, warnings))
-        warnings[before:] = [f"{path.name}: {warning}" for warning in warnings[before:]]
+            found = list(_cameras(content, size, told))
+        warnings += [f"{path.name}: {one}" for one in told]
         if not found:
             raise ValueError(
                 f"paths: must hold a camera matrix (K), DLT coefficients or P, got none in '{path}'"
@@ -663,10 +654,8 @@ def _cameras(
     content: Any, size: tuple[int, int] | None, warnings: list[str]
 ) -> Iterator[tuple[PerspectiveCamera, float]]:
     """The cameras of a file, each with the skew of its pixels."""
-    if isinstance(content, np.ndarray):
-        yield from _from_matrices(check_array("array", content), _size_of({}, size))
-        return
-    for name, table in _tables(content, "", warnings):
+    alone = isinstance(content, np.ndarray)
+    for name, table in [("", {"P": content})] if alone else _tables(content, "", warnings):
         try:
             if "K" in table:
                 yield _from_opencv(table, size), 0.0
@@ -778,13 +767,11 @@ def _from_matrices(
 
 def _from_projection(matrix: Floats, size: tuple[int, int]) -> tuple[PerspectiveCamera, float]:
     """The camera of a projection matrix with a positive determinant, and its skew."""
-    left = matrix[:, :3]
-    if not np.linalg.cond(left) < 1e12:
+    if not np.linalg.cond(matrix[:, :3]) < 1e12:
         raise ValueError("P: must be of a camera at a finite place, got a singular matrix")
-    inner, rotation = rq(left)
-    signs = np.diag(np.sign(np.diag(inner)))
-    inner, rotation = inner @ signs, signs @ rotation
-    shift = np.linalg.solve(inner, matrix[:, 3])
+    parts = cv2.decomposeProjectionMatrix(matrix)[:3]
+    inner, rotation, place = (np.asarray(part, float) for part in parts)
+    shift = -rotation @ place[:3, 0] / place[3]
     inner = inner / inner[2, 2]
     skew = abs(inner[0, 1] / inner[1, 1]) * size[1] / 2
     if skew > _SKEWED:

@@ -45,19 +45,7 @@ from ..arrays import Floats, Ints
 from ..progress import bar
 from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, known_to
 from .calibrate import check_learnable, closed_form
-from .clocks import (
-    INSTANTS,
-    OVERLAP,
-    Curve,
-    Footage,
-    Lags,
-    align,
-    check_clocks,
-    check_lags,
-    check_rates,
-    dips,
-    list_lags,
-)
+from .clocks import INSTANTS, OVERLAP, Footage, Lags, check_lags, dips, list_lags
 from .models import TRIMMED, Camera, at_once, epipolar_lines, epipolar_rows, missed, trimmed
 from .rig import ALIKE, BETTER, DISAGREEMENT, FINE, GROSS, Rig, check_seen
 from .unmeasured import posed
@@ -99,14 +87,13 @@ def lag_misses(
             continue
         margin = OVERLAP * min(ends[known], ends[other])
         lags = np.arange(np.ceil(margin - ends[other]), ends[known] - margin + 1)
-        first, second = cameras[known], cameras[other]
-        lines = epipolar_lines(first.somewhere, curves[known].at(frames), second.somewhere)
+        lines = epipolar_lines(cameras[known], curves[known].at(frames), cameras[other])
         instants, rate = frames / footage.rates[known], footage.rates[other]
         missed = []
         # So many pairs of a lag and an instant at a time.
         for block in np.array_split(lags, int(np.ceil(lags.size * frames.size / 200_000))):
             theirs = curves[other].at((instants - block[:, None]) * rate)
-            missed.append(pair_missed(second, lines, theirs))
+            missed.append(pair_missed(cameras[other], lines, theirs))
         yield lags, np.concatenate(missed)
 
 
@@ -116,7 +103,6 @@ def pair_missed(other: Camera, lines: tuple[Floats, Floats], theirs: Floats) -> 
     Its image may be shifted. One instant in ten is left out. Infinite where too few are left.
     """
     design, target = epipolar_rows(lines, other, theirs)
-    target = target - design @ other.scaled_turn
     shift = np.broadcast_to(lines[0], design.shape)
     design = shift if other.is_calibrated else np.concatenate((design, shift), axis=-1)
     seen = np.isfinite(target) & np.isfinite(design).all(axis=-1)
@@ -255,13 +241,12 @@ def learn_lags(
     """
     check_learnable(rig)
     tracks = check_seen(tracks, rig)
-    first = check_lags("start", np.zeros(len(tracks)) if start is None else start, len(tracks))
-    given = check_rates(rates, len(tracks))
-    rig = posed(align(tracks, first, given, clocks), rig, synchronous=False)
+    first = check_lags("start", start, len(tracks))
+    footage = Footage.of(tracks, None, rates, clocks)
+    rig = posed(replace(footage, lags=first).aligned, rig, synchronous=False)
     with bar(progress, "synchronise", unit="fit") as shown:
-        videos = _Videos.of(tracks, rig, given, clocks, shown)
-        found = _learned(videos, first)
-    return found if clocks is None else replace(found, clocks=videos.given.clocks)
+        found = _learned(_Videos.of(footage, rig, shown), first)
+    return found if clocks is None else replace(found, clocks=footage.clocks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,41 +258,24 @@ class _Videos:
     shown: tqdm | None = None
 
     @classmethod
-    def of(
-        cls,
-        tracks: Sequence[Floats],
-        rig: Rig,
-        rates: Floats,
-        clocks: Sequence[ArrayLike] | None,
-        shown: tqdm | None = None,
-    ) -> _Videos:
-        """Of tracks as they are given."""
-        still = at_once(rig.cameras, tracks)
+    def of(cls, given: Footage, rig: Rig, shown: tqdm | None = None) -> _Videos:
+        """Of footage as it is given, with its shutters."""
+        still = at_once(rig.cameras, given.tracks)
         instant = tuple(replace(camera, readout=0.0) for camera in rig.cameras)
-        footage = Footage.of(still, None, rates, check_clocks(clocks, tracks))
-        return cls(footage, instant, shown)
-
-    def footage(self, lags: Floats, rough: bool = False) -> Footage:
-        """All instants, or some."""
-        every = replace(self.given, lags=lags)
-        return every.some if rough else every
+        return cls(Footage.of(still, None, given.rates, given.clocks), instant, shown)
 
     def cameras(self, footage: Footage) -> tuple[Camera, ...] | None:
         """Those that the closed form finds; None if it finds none."""
-        tracks = footage.aligned
-        if not all(np.isfinite(track).any() for track in tracks):
-            return None
         try:
-            return closed_form(tracks, self.known, checked=False)
+            return closed_form(footage.aligned, self.known, checked=False)
         except ValueError:
             return None
 
     def errors(self, rough: bool = False, loose: bool = False) -> Floats:
         """What is known of cameras, and of all lags but the first one's nothing."""
         errors = np.array([known_to(camera) for camera in self.known])
-        if (
-            rough and len(self.given.instants) > INSTANTS
-        ):  # which are too few to tell where the target was between two
+        # Some instants are too few to tell where the target was between two.
+        if rough and len(self.given.instants) > INSTANTS:
             errors[:, PARTS["readout"]] = 0.0
         errors[1:, LAG] = np.inf
         if loose:
@@ -322,7 +290,7 @@ class _Videos:
         """The best lags near given ones, or better ones than these; None if nothing fits."""
         if self.shown is not None:
             self.shown.update()
-        footage = self.footage(lags, rough)
+        footage = replace(self.given.some if rough else self.given, lags=lags)
         cameras = self.cameras(footage)
         if cameras is None:
             return None
@@ -419,11 +387,8 @@ def _moved(fit: Adjustment) -> float:
 
 def _different(found: list[Adjustment]) -> list[Adjustment]:
     """The first of all that have the same lags."""
-    kept: list[Adjustment] = []
-    for one in found:
-        if not any(near(one, other.footage.lags) for other in kept):
-            kept.append(one)
-    return kept
+    lags = [one.footage.lags for one in found]
+    return [f for k, f in enumerate(found) if not any(near(f, other) for other in lags[:k])]
 
 
 # --------------------------------------------------------------------- errors, and what is told
@@ -462,7 +427,7 @@ def _told(videos: _Videos, fit: Adjustment, first: Floats) -> Lags:
 def _untold(videos: _Videos, lags: Floats, agree: bool) -> Lags:
     """Lags of which the tracks tell nothing, as all agree or none; the first one is the clock."""
     errors = np.where(np.arange(len(lags)) > 0, np.inf, 0.0)
-    residual, footage = np.inf, videos.footage(lags)
+    residual, footage = np.inf, replace(videos.given, lags=lags)
     cameras = videos.cameras(footage)
     if cameras is not None:
         residual = max(map(trimmed, missed(cameras, footage.aligned)))
@@ -486,12 +451,10 @@ def _blurred(i: int, lags: Floats) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Mistake:
-    """What may have been done to the tracks, and what they are without it."""
+    """What may have been done to the footage, and what it is without that."""
 
     what: str
-    tracks: tuple[Floats, ...]
-    rates: Floats
-    clocks: tuple[Floats, ...]
+    footage: Footage
     lags: Lags = Lags(np.zeros(0), np.zeros(0), np.zeros(0), np.inf)
     before: float = np.inf
     alike: tuple[str, ...] = ()
@@ -506,22 +469,24 @@ class Mistake:
             + (f"; as well do {', and '.join(self.alike)}: another path" if self.alike else "")
         )
 
-    def paired(self, cameras: Sequence[Camera]) -> tuple[float, Floats]:
-        """By how much two views disagree at their best lags, all pairs; and these lags."""
-        footage = Footage.of(self.tracks, None, self.rates, self.clocks)
-        each = [*lag_misses(footage, cameras, _INSTANTS)]
-        lags = np.array([tried[left.argmin()] for tried, left in each])
-        return float(np.linalg.norm([left.min() for _, left in each])), lags - lags[0]
 
-    def fits(self, rig: Rig, *lags: Floats) -> list[Adjustment]:
-        """Cameras and lags near these, roughly."""
-        videos = _Videos.of(self.tracks, rig, self.rates, self.clocks)
-        found = [videos.fitted(each, rough=True) for each in np.unique(lags, axis=0)]
-        return [fit for fit in found if fit]
+def _paired(footage: Footage, cameras: Sequence[Camera]) -> tuple[float, Floats]:
+    """By how much two views disagree at their best lags, all pairs; and these lags."""
+    each = [*lag_misses(footage, cameras, _INSTANTS)]
+    lags = np.array([tried[left.argmin()] for tried, left in each])
+    return float(np.linalg.norm([left.min() for _, left in each])), lags - lags[0]
 
-    def near(self, rig: Rig, start: Floats) -> list[Adjustment]:
-        """Near given lags and the best of two views, which are as rough as the rig."""
-        return self.fits(rig, start, self.paired(rig.cameras)[1])
+
+def _fits(footage: Footage, rig: Rig, *lags: Floats) -> list[Adjustment]:
+    """Cameras and lags near these, roughly."""
+    videos = _Videos.of(footage, rig)
+    found = [videos.fitted(each, rough=True) for each in np.unique(lags, axis=0)]
+    return [fit for fit in found if fit]
+
+
+def _near(footage: Footage, rig: Rig, start: Floats) -> list[Adjustment]:
+    """Near given lags and the best of two views, which are as rough as the rig."""
+    return _fits(footage, rig, start, _paired(footage, rig.cameras)[1])
 
 
 def find_mistake(
@@ -541,41 +506,39 @@ def find_mistake(
     names : sequence of str
         What the videos are called.
     """
-    none = Mistake("", tuple(tracks), rates, check_clocks(clocks, tracks))
+    given, found = Footage.of(tracks, None, rates, clocks), list[Mistake]()
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
-        begun = none.near(rig, start)
+        begun = _near(given, rig, start)
         left = min(map(_worst, begun), default=np.inf)
         if left <= 2 * DISAGREEMENT:
             return None
-        found: list[Mistake] = []
         # Whole views are not mistaken where most frames agree.
         most = min((fit.left() for fit in begun), default=np.inf) <= 2 * DISAGREEMENT
-        for kind in (partial(_dropped, start=start), *(() if most else (_views, _rates))):
+        for kind in (partial(_dropped, start=start), *(() if most else (_whole,))):
             if found and found[-1].lags.residual <= DISAGREEMENT:
                 break
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
             # none.
-            each = {one.what: one for one in kind(none, rig, names)}.values()
-            ranked = [(*one.paired(rig.cameras), one) for one in each]
+            each = kind(given, rig, names)
+            ranked = [(*_paired(one.footage, rig.cameras), one) for one in each]
             ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
             tried = [
                 (_worst(fit), fit, one)
                 for _, best, one in ranked
-                for fit in one.fits(rig, start, best)
+                for fit in _fits(one.footage, rig, start, best)
             ]
             for now, fit, one in sorted(tried, key=lambda one: one[0]):
                 # Times by which it has to mend the disagreement of all views together.
                 if now > GROSS or 3.0 * now >= left:
                     break
-                lags = fit.footage.lags
-                told = learn_lags(one.tracks, rig, one.rates, lags, one.clocks)
+                mended, lags = one.footage, fit.footage.lags
+                told = learn_lags(mended.tracks, rig, mended.rates, lags, mended.clocks)
                 if told.agree and told.residual <= 2 * DISAGREEMENT:
                     others = [o.what for n, _, o in tried if n <= ALIKE * max(now, FINE)]
                     alike = tuple(dict.fromkeys(o for o in others if o != one.what))
                     found.append(replace(one, lags=told, before=left, alike=alike))
                     break
-        return min(found, key=lambda one: one.lags.residual, default=None)
-    return None
+    return min(found, key=lambda one: one.lags.residual, default=None)
 
 
 def _worst(fit: Adjustment) -> float:
@@ -585,16 +548,15 @@ def _worst(fit: Adjustment) -> float:
     return max(trimmed(view, 0.5) for view in views)
 
 
-def _views(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
-    """All that change whole views: their order, and their axes."""
+def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
+    """All that change whole views: their order, their axes, and rates taken for each other."""
     count, sizes = len(names), [camera.image_size for camera in rig.cameras]
     for moved, order in _orders(count):
         if len({sizes[i] for i in moved}) == 1:
-            tracks, clocks = (tuple(one[i] for i in order) for one in (none.tracks, none.clocks))
-            rates = none.rates[order] / none.rates[order[0]]
+            tracks, clocks = ([one[i] for i in order] for one in (given.tracks, given.clocks))
             how = "swapped" if len(moved) == 2 else "in another order than their cameras"
             what = f"{' and '.join(names[i] for i in moved)} {how}"
-            yield Mistake(what, tracks, rates, clocks)
+            yield Mistake(what, Footage.of(tracks, None, given.rates[order], clocks))
     known = {i for i, camera in enumerate(rig.cameras) if camera.is_calibrated}
     for views in (*({i} for i in range(count)), {*range(count)}):
         told, ways = "all views", ["mirrored", "with v counted upwards"]
@@ -607,12 +569,16 @@ def _views(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
             elif not known & views:
                 ways = [", or ".join(ways)]
         for axis, how in enumerate(ways):
-            tracks = tuple(
+            tracks = [
                 np.where(np.arange(2) == axis, np.array(size) - 1 - track, track)
                 if i in views else track
-                for i, (track, size) in enumerate(zip(none.tracks, sizes, strict=True))
-            )  # fmt: skip
-            yield replace(none, what=f"{told} {how}", tracks=tracks)
+                for i, (track, size) in enumerate(zip(given.tracks, sizes, strict=True))
+            ]  # fmt: skip
+            yield Mistake(f"{told} {how}", Footage.of(tracks, None, given.rates, given.clocks))
+    for i, (real, stated) in product(range(count), RATES):
+        rates = np.where(np.arange(count) == i, real / stated, 1.0) * given.rates
+        what = f"{names[i]} with {real} frames for {stated} that are supposed"
+        yield Mistake(what, replace(given, rates=rates / rates[0]))
 
 
 def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
@@ -624,34 +590,24 @@ def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
             yield moved, order.tolist()
 
 
-def _rates(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
-    """Frame rates that are taken for each other."""
-    count = len(names)
-    for i in range(count):
-        for real, stated in RATES:
-            rates = np.where(np.arange(count) == i, real / stated, 1.0) * none.rates
-            what = f"{names[i]} with {real} frames for {stated} that are supposed"
-            yield replace(none, what=what, rates=rates / rates[0])
-
-
-def _dropped(none: Mistake, rig: Rig, names: Sequence[str], start: Floats) -> Iterator[Mistake]:
+def _dropped(given: Footage, rig: Rig, names: Sequence[str], start: Floats) -> Iterator[Mistake]:
     """Videos of which frames were dropped, with the clocks by which they agree all the time."""
-    length, ways = Footage.of(none.tracks, None, none.rates, none.clocks).lengths.min(), []
+    length, ways = given.lengths.min(), []
     for low in _PARTS:  # in one of them none is dropped, maybe: its cameras tell when
-        begins, ends = length * np.outer([low, low + _PART], none.rates)
-        rows = [(b <= c) & (c <= e) for b, c, e in zip(begins, none.clocks, ends, strict=True)]
+        begins, ends = length * np.outer([low, low + _PART], given.rates)
+        rows = [(b <= c) & (c <= e) for b, c, e in zip(begins, given.clocks, ends, strict=True)]
         tracks, clocks = (
-            [x[r] for x, r in zip(each, rows, strict=True)] for each in (none.tracks, none.clocks)
+            [x[r] for x, r in zip(each, rows, strict=True)] for each in (given.tracks, given.clocks)
         )
         if min(map(len, tracks)) > 1:
-            part = replace(none, tracks=tuple(tracks), clocks=tuple(c - c[0] for c in clocks))
-            ways += [_jumped(none, none, fit) for fit in part.near(rig, start)]
+            part = Footage.of(tracks, None, given.rates, clocks)
+            ways += [_jumped(given, given, fit) for fit in _near(part, rig, start)]
     for _ in range(3):  # as what is mended tells the cameras, and these the rest
         if not ways:
             return
         _, lags, found = min(ways, key=lambda way: way[0])
-        ways = [_jumped(none, found, fit) for fit in found.fits(rig, lags)]
-    lacking = [np.diff(now - then) for now, then in zip(found.clocks, none.clocks, strict=True)]
+        ways = [_jumped(given, found, fit) for fit in _fits(found, rig, lags)]
+    lacking = [np.diff(now - then) for now, then in zip(found.clocks, given.clocks, strict=True)]
     told = [
         f"{missing[k]:.0f} frames dropped of {name} before its frame {k + 1}"
         for name, missing in zip(names, lacking, strict=True)
@@ -659,17 +615,18 @@ def _dropped(none: Mistake, rig: Rig, names: Sequence[str], start: Floats) -> It
     ]
     if told:  # of several places one may have taken a few frames of another
         about = "about " if len(told) > 1 else ""
-        yield replace(found, what=", ".join(about + one for one in told))
+        yield Mistake(", ".join(about + one for one in told), found)
 
 
-def _jumped(none: Mistake, given: Mistake, fit: Adjustment) -> tuple[float, Floats, Mistake]:
+def _jumped(given: Footage, mended: Footage, fit: Adjustment) -> tuple[float, Floats, Footage]:
     """With the clock of one video set forward at some frames; what is missed, and its lags.
 
     The lags that leave the least, each jump at a price, by dynamic programming.
     """
-    lags, rates, tried = fit.footage.lags, given.rates, np.arange(-_LONGEST, _LONGEST + 1)
-    curves, missed_before, ways = tuple(map(Curve, given.tracks, given.clocks)), 0.0, []
-    for i, (camera, stated, curve) in enumerate(zip(fit.cameras, none.clocks, curves, strict=True)):
+    lags, rates, tried = fit.footage.lags, mended.rates, np.arange(-_LONGEST, _LONGEST + 1)
+    curves, missed_before, ways = mended.curves, 0.0, []
+    each = zip(fit.cameras, given.clocks, curves, strict=True)
+    for i, (camera, stated, curve) in enumerate(each):
         stride = -(-len(stated) // _FRAMES)
         late = (curve.clock - stated)[::stride]
         middle = np.rint(late.mean())
@@ -679,8 +636,7 @@ def _jumped(none: Mistake, given: Mistake, fit: Adjustment) -> tuple[float, Floa
             if j != i:
                 lines = epipolar_lines(camera, curve.track[::stride], other)
                 theirs = curves[j].at((instants - lags[j]) * rates[j])
-                design, target = epipolar_rows(lines, other, theirs)
-                missed[j] = (target - design @ other.scaled_turn) / other.calibration[0]
+                missed[j] = epipolar_rows(lines, other, theirs)[1] / other.calibration[0]
         seen, costs = np.isfinite(missed), np.log1p((missed / DISAGREEMENT) ** 2)
         cost = np.nansum(costs, axis=0) / np.maximum(seen.sum(axis=0), 1)
         # What nobody saw costs as much as what was seen: no lag is better for leaving frames out.
@@ -694,11 +650,11 @@ def _jumped(none: Mistake, given: Mistake, fit: Adjustment) -> tuple[float, Floa
         missed_before += before / len(late) / 2  # as each pair of views counts twice
         later = np.repeat(tried[path] + middle, stride)[: len(stated)]
         ahead = np.where(np.arange(len(curves)) == i, later[0] / rates[i], 0.0) + lags
-        clocks = tuple(stated + later - later[0] if one is curve else one.clock for one in curves)
+        clocks = [stated + later - later[0] if one is curve else one.clock for one in curves]
         gain = (before - least) / len(late)
-        ways.append((gain, ahead - ahead[0], replace(given, clocks=clocks)))
-    gain, lags, mended = max(ways, key=lambda way: way[0])
-    return missed_before - gain, lags, mended
+        ways.append((gain, ahead - ahead[0], Footage.of(mended.tracks, None, rates, clocks)))
+    gain, lags, found = max(ways, key=lambda way: way[0])
+    return missed_before - gain, lags, found
 
 
 def _cheapest(costs: Floats) -> Ints:

@@ -187,25 +187,22 @@ def _joined(runs: Sequence[_Run], cameras: Rig) -> list[list[_Run]]:
 
     The surest pairs of runs are joined first.
     """
-    links = []
-    for i, j in combinations(range(len(runs)), 2):
-        link = _link(runs[i], runs[j], cameras)
-        if link is not None:
-            links.append((*link, i, j))
-    groups = [[i] for i in range(len(runs))]  # of each run, all that are joined to it
-    # Of each run, which of its targets is the first one of its group, the second and so on.
-    orders = [list(range(run.places.shape[1])) for run in runs]
+    links = [
+        (*link, i, j)
+        for i, j in combinations(range(len(runs)), 2)
+        if (link := _link(runs[i], runs[j], cameras))
+    ]
+    # Of each run the group that it is joined to: runs, and the order of their targets in it.
+    groups = [{i: list(range(run.places.shape[1]))} for i, run in enumerate(runs)]
     for _, order, i, j in sorted(links, key=lambda link: -link[0]):
-        if groups[i] is groups[j]:
-            continue
-        change = [orders[j].index(order[target]) for target in orders[i]]
-        for one in groups[j]:
-            orders[one] = [orders[one][target] for target in change]
-            groups[i].append(one)
-        for one in groups[i]:
-            groups[one] = groups[i]
+        mine, theirs = groups[i], groups[j]
+        if mine is not theirs:
+            change = [theirs[j].index(order[target]) for target in mine[i]]
+            for k, there in theirs.items():
+                mine[k] = [there[target] for target in change]
+                groups[k] = mine
     unique = {id(group): group for group in groups if len(group) > 1}
-    found = [[runs[i].ordered(orders[i]) for i in group] for group in unique.values()]
+    found = [[runs[i].ordered(order) for i, order in each.items()] for each in unique.values()]
     return sorted(found, key=_first)
 
 

@@ -28,7 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import combinations, product
+from itertools import chain, combinations, product
 from typing import Any, NamedTuple
 
 import cv2
@@ -38,7 +38,7 @@ from scipy.optimize import least_squares
 
 from ..arrays import Floats
 from .adjust import PARTS, Adjustment, adjust, known_to
-from .clocks import OVERLAP, Footage, Lags, check_clocks, dips
+from .clocks import OVERLAP, Footage, Lags, dips
 from .models import AffineCamera, PerspectiveCamera, at_once, missed
 from .rig import ALIKE, BETTER, FINE, GROSS, Rig, check_views
 
@@ -125,9 +125,7 @@ def _starts(
             for lens, track in zip(lenses, views, strict=True)
         ]
         pairs = (_around(rays, lenses, pair) for pair in combinations(range(len(rays)), 2))
-        for poses in (*pairs, *_far_away(rays, lenses)):
-            if poses is None:
-                continue
+        for poses in chain(*pairs, _far_away(rays, lenses)):
             cameras = _homed(lenses, poses)
             misses = np.hstack(missed(cameras, views))
             seen = np.isfinite(misses)
@@ -146,19 +144,19 @@ def _lens(camera: PerspectiveCamera, view: float) -> PerspectiveCamera:
 
 def _around(
     rays: Sequence[Floats], cameras: Sequence[PerspectiveCamera], pair: tuple[int, int]
-) -> list[_Pose] | None:
-    """Poses of cameras around what two of them see; None if they tell nothing."""
+) -> Iterator[list[_Pose]]:
+    """Poses of cameras around what two of them see; none if they tell nothing."""
     i, j = pair
     both = np.isfinite(rays[i]).all(axis=1) & np.isfinite(rays[j]).all(axis=1)
     if both.sum() < _FEWEST:
-        return None
+        return
     seen, centre = (rays[i][both], rays[j][both]), np.eye(3)
     essential, mask = cv2.findEssentialMat(
         *seen, centre, method=cv2.USAC_ACCURATE, prob=0.9999,
         threshold=GROSS / min(cameras[k].focal_length for k in pair),
     )  # fmt: skip
     if essential is None or essential.shape != (3, 3):
-        return None
+        return
     _, turn, shift, front, homogeneous = cv2.recoverPose(
         essential, *seen, centre, distanceThresh=50.0, mask=mask
     )
@@ -170,7 +168,7 @@ def _around(
     for k in set(range(len(cameras))) - set(pair):
         told = np.isfinite(points).all(axis=1) & np.isfinite(rays[k]).all(axis=1)
         if told.sum() < _FEWEST:
-            return None
+            return
         wide = _WIDE * float(np.ptp(points[told], axis=0).max())
         try:
             done, axis, place, _ = cv2.solvePnPRansac(
@@ -178,11 +176,11 @@ def _around(
                 reprojectionError=3 * GROSS / cameras[k].focal_length,
             )  # fmt: skip
         except cv2.error:  # points of one draw lie too close together
-            return None
+            return
         if not done:
-            return None
+            return
         poses[k] = np.asarray(cv2.Rodrigues(axis)[0]), wide * np.asarray(place)[:, 0]
-    return [poses[k] for k in sorted(poses)]
+    yield [poses[k] for k in sorted(poses)]
 
 
 def _far_away(
@@ -193,14 +191,11 @@ def _far_away(
     Centred images are then a matrix M (2 m, 3) times the path, and M A holds the rows of scaled
     rotations. With Q = A A', m1' Q m2 = 0 and m1' Q m1 = m2' Q m2 in each camera, linear in Q.
     """
-    images = [c.focal_length * seen for c, seen in zip(cameras, rays, strict=True)]
-    every = np.hstack(images)
-    every = every[np.isfinite(every).all(axis=1)]
-    if len(every) < _FEWEST:
+    images = np.hstack([c.focal_length * seen for c, seen in zip(cameras, rays, strict=True)])
+    if np.isfinite(images).all(axis=1).sum() < _FEWEST:
         return
-    middle = every.mean(axis=0)
-    left, singular, _ = np.linalg.svd((every - middle).T, full_matrices=False)
-    motion = (left[:, :3] * singular[:3]).reshape(-1, 2, 3)
+    middle, singular, axes = _spread(images)
+    motion = (singular[:3] * axes[:3].T).reshape(-1, 2, 3)
     sizes = np.linalg.norm(motion, axis=(1, 2), keepdims=True)
     if not sizes.all():  # nothing moves in some view
         return
@@ -273,20 +268,14 @@ def _framed(rig: Rig, fit: Adjustment, mirrored: bool) -> Rig:
 
 def _note(rig: Rig) -> str:
     """What cannot be known of a rig that nobody has measured."""
-    length = (
-        "the unit of length is the distance from the first camera to the second"
-        if rig.distance is None
-        else f"the first camera is {rig.distance:g} from the second"
-    )
-    lenses = (
-        "; focal lengths are those that the tracks tell"
-        if any(camera.scale is None for camera in rig.cameras)
-        else ""
-    )
+    told = "the unit of length is the distance from the first camera to the second"
+    if rig.distance is not None:
+        told = f"the first camera is {rig.distance:g} from the second"
+    if any(camera.scale is None for camera in rig.cameras):
+        told += "; focal lengths are those that the tracks tell"
     return (
         "nothing is measured of where the cameras stand: x is to the right and y up in the image "
-        "of the first camera, z points towards it, the origin is the middle of the path, "
-        f"{length}{lenses}"
+        f"of the first camera, z points towards it, the origin is the middle of the path, {told}"
     )
 
 
@@ -316,42 +305,31 @@ def factorised(
     rates, clocks, lags
         See `align`; lags are found if they are not given.
     """
-    films = Footage.of(tracks, None, rates, check_clocks(clocks, tracks))
-    some, ranks = films.some, range(1, 4)
-    found = [
-        _best(some, rank) if lags is None else (_left(some, lags, range(len(tracks)), rank), lags)
-        for rank in ranks
-    ]
+    films = Footage.of(tracks, None, rates, clocks)
+    some, ranks, every = films.some, range(1, 4), range(len(tracks))
+    found = [_best(some, rank, lags) for rank in ranks]
     enough = max(BETTER * found[-1][0], FINE)
-    rank = next(rank for rank, (left, _) in zip(ranks, found, strict=True) if left <= enough)
-    left, best = found[rank - 1]
+    rank = next(rank for rank, (left, *_) in zip(ranks, found, strict=True) if left <= enough)
+    left, best, errors = found[rank - 1]
     if not np.isfinite(left):
         return None
-    every = np.hstack(replace(films, lags=best).aligned)
-    every = every[np.isfinite(every).all(axis=1)]
-    count, middle = len(tracks), every.mean(axis=0)
-    moved = every - middle
-    axes = np.linalg.svd(moved, full_matrices=False)[2]
-    missed = moved - moved @ axes[:rank].T @ axes[:rank]
-    of_views = [
-        (part**2).reshape(len(every), count, 2).mean(axis=(0, 2)) for part in (moved, missed)
-    ]
+    images = _images(films, best, every)
+    moved, missed = (
+        np.nanmean((_beyond(images, r) ** 2).reshape(-1, len(tracks), 2), axis=(0, 2))
+        for r in (0, rank)
+    )
     # Times what is left by which a target must move, rms, in every view.
-    if not (of_views[0] > 5.0**2 * of_views[1]).all():
+    if not (moved > 5.0**2 * missed).all():
         return None
-    cameras = [
-        AffineCamera.of(
-            np.sqrt(count) * axes[:3, 2 * i : 2 * i + 2].T, middle[2 * i : 2 * i + 2],
-            camera.image_size,
-        )
-        for i, camera in enumerate(rig.cameras)
-    ]  # fmt: skip
-    errors = _errors(some, best, rank) if lags is None else np.zeros(count)
+    middle, _, axes = _spread(images)
+    downs = np.split(np.sqrt(len(tracks)) * axes[:3].T, len(tracks))
+    places, sizes = np.split(middle, len(tracks)), [camera.image_size for camera in rig.cameras]
+    cameras = tuple(map(AffineCamera.of, downs, places, sizes))
     doubts = () if left <= GROSS else (
         f"views agree on one motion but for {left:.2g} pixels of noise: look at the tracks",
     )  # fmt: skip
     told = Lags(best, rates, errors, left, doubts, clocks=films.clocks if clocks else ())
-    return Factorised(Rig(tuple(cameras), note=_NOTE), told, rank)
+    return Factorised(Rig(cameras, note=_NOTE), told, rank)
 
 
 def _least(footage: Footage) -> float:
@@ -361,7 +339,7 @@ def _least(footage: Footage) -> float:
 
 def _left(footage: Footage, lags: Floats, places: Sequence[int], rank: int) -> float:
     """Noise of the pixels that is left beyond a rank; infinite of too few common frames."""
-    beyond = _beyond(footage, lags, places, rank)
+    beyond = _beyond(_images(footage, lags, places), rank)
     count, width = np.isfinite(beyond[:, 0]).sum(), beyond.shape[1]
     step = footage.span / max(len(footage.instants) - 1, 1)
     if count <= width or count * step < _least(footage):
@@ -369,28 +347,30 @@ def _left(footage: Footage, lags: Floats, places: Sequence[int], rank: int) -> f
     return float(np.sqrt(np.nansum(beyond**2) / (count * (width - rank))))
 
 
-def _best(footage: Footage, rank: int) -> tuple[float, Floats]:
-    """What the lags leave beyond a rank that leave least, and those lags.
+def _best(footage: Footage, rank: int, given: Floats | None) -> tuple[float, Floats, Floats]:
+    """What the lags leave beyond a rank that leave least, those lags, and their errors.
 
+    Unless they are given.
     Of two views, lags are promising that leave less than their neighbours; of three, these are
     tried together, and further views one by one. Of those that leave about as little, the
     shortest count.
     """
     count = len(footage.curves)
     lags = np.zeros(count)
+    if given is not None:
+        return _left(footage, given, range(count), rank), given, lags
     promising = [_promising(footage, i, rank)[:_PROMISING] or [0.0] for i in range(1, count)]
     for last in range(3, count + 1):
         tried = []
         for new in product(*promising[:2]) if last == 3 else product(promising[last - 2]):
             lags[last - len(new) : last] = new
             tried.append((_left(footage, lags, range(last), rank), tuple(lags)))
-        starts = [np.array(one) for _, one in sorted(tried)[:_LAGS]]
-        found = [_polished(footage, one, last, rank) for one in starts]
-        left = np.array([_left(footage, one, range(last), rank) for one in found])
+        found = [_polished(footage, np.array(one), last, rank) for _, one in sorted(tried)[:_LAGS]]
+        left = np.array([_left(footage, one, range(last), rank) for one, _ in found])
         alike = np.flatnonzero(left <= max(ALIKE * left.min(), FINE))
-        shortest = min(alike, key=lambda k: np.abs(found[k]).sum())
-        lags, least = found[shortest], float(left[shortest])
-    return least, lags
+        shortest = min(alike, key=lambda k: np.abs(found[k][0]).sum())
+        (lags, errors), least = found[shortest], float(left[shortest])
+    return least, lags, errors
 
 
 def _promising(footage: Footage, i: int, rank: int) -> list[float]:
@@ -402,43 +382,41 @@ def _promising(footage: Footage, i: int, rank: int) -> list[float]:
     return dips(tried, np.array([_left(footage, lags, (0, i), rank) for lags in every]))
 
 
-def _polished(footage: Footage, lags: Floats, count: int, rank: int) -> Floats:
-    """The lags of so many views, to fractions of a frame, that leave least near by."""
+def _polished(footage: Footage, lags: Floats, count: int, rank: int) -> tuple[Floats, Floats]:
+    """The lags of so many views, to fractions of a frame, that leave least near by.
+
+    And their standard errors, if what is left is independent noise.
+    """
 
     def beyond(others: Floats) -> Floats:
-        late = np.concatenate(([0.0], others, lags[count:]))
-        return np.nan_to_num(_beyond(footage, late, range(count), rank)).ravel()
+        late = np.append(0.0, others)
+        return np.nan_to_num(_beyond(_images(footage, late, range(count)), rank)).ravel()
 
     found = least_squares(beyond, lags[1:count], diff_step=1e-3, max_nfev=_STEPS)
-    return np.concatenate(([0.0], found.x, lags[count:]))
+    information, errors = found.jac.T @ found.jac, np.full(count - 1, np.inf)
+    if np.linalg.cond(information) <= 1 / np.finfo(float).eps:
+        variance = 2 * found.cost / max(np.count_nonzero(found.fun) / 2, 1)
+        errors = np.sqrt(variance * np.diag(np.linalg.inv(information)))
+    last = np.zeros(len(lags) - count)
+    return np.concatenate(([0.0], found.x, last)), np.concatenate(([0.0], errors, last))
 
 
-def _beyond(footage: Footage, lags: Floats, places: Sequence[int], rank: int) -> Floats:
-    """Tracks of some views side by side, (n, 2 m), without their mean and so many directions.
-
-    NaN where a view is missing.
-    """
+def _images(footage: Footage, lags: Floats, places: Sequence[int]) -> Floats:
+    """Tracks of some views that begin so late, side by side, (n, 2 m)."""
     late = replace(footage, lags=lags)
-    matrix = np.hstack([late.curves[i].at(late.frames(i)) for i in places])
-    seen = np.isfinite(matrix).all(axis=1)
-    matrix[~seen] = np.nan
-    if seen.any():
-        centred = matrix[seen] - matrix[seen].mean(axis=0)
-        axes = np.linalg.svd(centred, full_matrices=False)[2][:rank]
-        matrix[seen] = centred - centred @ axes.T @ axes
-    return matrix
+    return np.hstack([late.curves[i].at(late.frames(i)) for i in places])
 
 
-def _errors(footage: Footage, lags: Floats, rank: int) -> Floats:
-    """Standard errors of the lags, if what is left is independent noise, (m,)."""
-    every, step = range(len(lags)), 1e-2
-    here = np.nan_to_num(_beyond(footage, lags, every, rank))
-    moves = step * np.eye(len(lags))[1:]
-    ends = [[_beyond(footage, lags + s * move, every, rank) for s in (1, -1)] for move in moves]
-    slopes = np.array([(later - sooner).ravel() / (2 * step) for later, sooner in ends])
-    slopes = np.nan_to_num(slopes)
-    information = slopes @ slopes.T
-    if np.linalg.cond(information) > 1 / np.finfo(float).eps:
-        return np.append(0.0, np.full(len(slopes), np.inf))
-    variance = (here**2).sum() / max(np.count_nonzero(here) / 2, 1)
-    return np.append(0.0, np.sqrt(variance * np.diag(np.linalg.inv(information))))
+def _spread(images: Floats) -> tuple[Floats, Floats, Floats]:
+    """Middle of the rows in which no view is missing, and how far they spread along which axes."""
+    whole = images[np.isfinite(images).all(axis=1)]
+    middle = whole.mean(axis=0) if len(whole) else np.zeros(images.shape[1])
+    return middle, *np.linalg.svd(whole - middle, full_matrices=False)[1:]
+
+
+def _beyond(images: Floats, rank: int) -> Floats:
+    """These rows without their middle and so many of the axes; NaN where a view is missing."""
+    middle, _, axes = _spread(images)
+    centred = images - middle
+    centred[np.isnan(centred).any(axis=1)] = np.nan
+    return centred - centred @ axes[:rank].T @ axes[:rank]
