@@ -17,7 +17,7 @@ import io
 import json
 import os
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import cast
@@ -44,16 +44,12 @@ from ..vision import VideoInfo, pick_frames, read_frame, video_info
 LETTERS = "abcdefgh"  # of several targets, in the heads of tracks
 LONGEST_NAME = 30  # characters above a picture
 PAGE, DATA, RIG, TRACKS = FILES = ("report.html", "result.json", "rig.toml", "tracks.csv")
+_OF_CAMERA = ("model", "position", "normal", "scale", "scale_error", "angle", "homography")
 FORMAT = 1  # of result.json: counts up when what is in it changes its meaning
 
-STEPS = {
-    "track": "A target was not found in every video.",
-    "lags": "When each camera started could not be told.",
-    "cameras": "The cameras could not be learned.",
-    "law": "The path has no law that could be found.",
-}
 _TITLES = ("<title>Law of a moving target", "<title>No law: ")  # of pages that are ours
-_BEGIN = b'{\n "format": '  # of data that are
+_BEGIN = '{\n "format": '  # of data that are
+_HEAD = 1000  # characters
 
 FRAMES = 24  # of each video on the page
 _LONGEST = 1280  # pixels of a frame's longer side there
@@ -73,6 +69,7 @@ _PAGES = jinja2.Environment(
     undefined=jinja2.StrictUndefined,
     keep_trailing_newline=True,
 )
+_PAGES.globals |= {"data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS}
 
 
 def page(template: str, **values: object) -> str:
@@ -90,9 +87,18 @@ def check_page(name: str, path: str | os.PathLike, template: str) -> Path:
     """
     path, kind = check_path(name, path), Path(template).stem
     mark = f'<meta name="generator" content="vidsindy_lite {kind}">'
-    if path.exists() and not (path.is_file() and mark in path.read_text("utf-8", "replace")):
+    if path.exists() and not _holds(path, mark):
         raise ValueError(f"{name}: must be a new file or an earlier page of {kind}, got '{path}'")
     return path
+
+
+def _holds(path: Path, *marks: str) -> bool:
+    """Whether a file is there and can be read, and one of these marks is near its beginning."""
+    try:
+        start = path.read_text("utf-8", "replace")[:_HEAD]
+    except OSError:
+        return False
+    return any(mark in start for mark in marks)
 
 
 # --------------------------------------------------------------------------------------- the report
@@ -117,24 +123,14 @@ def check_folder_is_free(folder: str | Path) -> Path:
     except OSError:
         raise ValueError(f"out: the {whose} must be writable, got '{folder}'") from None
     strange = [name for name in FILES if (folder / name).exists()]
-    if strange and not _is_earlier(folder):
+    page, data = folder / PAGE, folder / DATA  # an interruption may have left the data alone
+    is_earlier = _holds(page, *_TITLES) or not page.exists() and _holds(data, _BEGIN)
+    if strange and not is_earlier:
         raise ValueError(
             f"out: must hold no files of the names {', '.join(FILES)} but of an earlier report, "
             f"got '{folder}' with {', '.join(strange)}"
         )
     return folder
-
-
-def _is_earlier(folder: Path) -> bool:
-    """Whether a folder holds an earlier report, or what an interruption has left of one."""
-    page, data = folder / PAGE, folder / DATA
-    try:
-        if page.exists():
-            return any(mark in page.read_text("utf-8", "replace") for mark in _TITLES)
-        with data.open("rb") as file:
-            return file.read(len(_BEGIN)) == _BEGIN
-    except OSError:
-        return False
 
 
 def write_report(
@@ -175,8 +171,7 @@ def write_report(
     content = summary(found, paths, options)
     files = _data(content, found.t, found.tracks)
     files |= {RIG: found.rig.text()} if len(found.rig.cameras) > 1 else {}
-    _put(folder, files | {PAGE: _page(found, paths, content, progress)})
-    return folder / PAGE
+    return _put(folder, files | {PAGE: _page(found, paths, content, progress)})
 
 
 def write_refusal(
@@ -217,18 +212,13 @@ def write_refusal(
         np.full((height, width, 3), 255, np.uint8) if paths is None else read_frame(paths[i], k)
         for i, ((width, height), k) in enumerate(zip(sizes, shown, strict=True))
     ]
-    # See `_figures`.
-    plt.draw_if_interactive()
-    with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
-        look = _encoded(_look(images, names, shown, refused.tracks, shown))
+    look = _picture(_look, images, names, shown, refused.tracks, shown)
     frames = np.arange(max(len(track) for track in refused.tracks), dtype=float)
     files = _data(content, frames, refused.tracks, "frame")
-    text = page("refusal.html", look=look, what=STEPS[refused.step], data_file=DATA, **content)
-    _put(folder, files | {PAGE: text})
-    return folder / PAGE
+    return _put(folder, files | {PAGE: page("refusal.html", look=look, **content)})
 
 
-def _put(folder: Path, texts: Mapping[str, str]) -> None:
+def _put(folder: Path, texts: Mapping[str, str]) -> Path:
     """Put the files of a report into its folder, and take away those of an earlier one."""
     check_folder_is_free(folder)  # again: a while has passed
     is_new = not folder.exists()
@@ -241,6 +231,7 @@ def _put(folder: Path, texts: Mapping[str, str]) -> None:
                 folder.rmdir()
     for name in set(FILES) - set(texts):
         (folder / name).unlink(missing_ok=True)
+    return folder / PAGE
 
 
 def _data(
@@ -251,19 +242,15 @@ def _data(
     columns = [f"{axis}{i + 1}{n}" for i in range(len(tracks)) for n in several for axis in "uv"]
     longest = len(instants)
     whole = [np.pad(t, ((0, longest - len(t)), (0, 0)), constant_values=np.nan) for t in tracks]
-    rows = (
-        ",".join(f"{value:.10g}" if np.isfinite(value) else "" for value in row)
-        for row in np.column_stack((instants, *whole))
-    )
-    table = "\n".join([",".join((instant, *columns)), *rows]) + "\n"
-    return {DATA: json.dumps(content, allow_nan=False, indent=1) + "\n", TRACKS: table}
+    table, head = io.StringIO(), ",".join((instant, *columns))
+    np.savetxt(table, np.column_stack((instants, *whole)), "%.10g", ",", header=head, comments="")
+    text = json.dumps(content, allow_nan=False, indent=1) + "\n"
+    return {DATA: text, TRACKS: table.getvalue().replace("nan", "")}
 
 
 def _names(paths: Sequence[str | Path] | None, count: int) -> list[str]:
     """What the videos are called."""
-    if paths is None:
-        return [f"camera {i + 1}" for i in range(count)]
-    return [Path(path).name for path in paths]
+    return [f"camera {i + 1}" if paths is None else Path(paths[i]).name for i in range(count)]
 
 
 def summary(
@@ -287,16 +274,16 @@ def summary(
         length = length[np.isfinite(length)]
         cameras.append({
             "video": names[i], "frames": shot.frames, "fps": shot.fps,
-            "image_size": list(shot.size), "model": camera.model,
-            "position": camera.position, "normal": camera.normal,
-            "scale": camera.scale, "scale_error": camera.scale_error, "angle": camera.angle,
-            "homography": getattr(camera, "homography", None),
+            "image_size": list(shot.size),
+            **{name: getattr(camera, name, None) for name in _OF_CAMERA},
             "lag": found.lags.frames[i], "lag_error": found.lags.errors[i],
             "share_of_frames_seen": seen.mean(),
             "residual_rms": np.sqrt(np.mean(length**2)) if len(length) else np.nan,
             "residual_of_nine_in_ten": np.quantile(length, 0.9) if len(length) else np.nan,
         })  # fmt: skip
     law = found.discovery
+    states = np.split(law.curve(found.t), law.system.order, axis=1)  # places, and velocities
+    turn = np.eye(states[0].shape[1]) if law.orientation is None else law.orientation
     content = {
         "format": FORMAT,
         "status": found.status,
@@ -314,18 +301,11 @@ def summary(
         "options": dict(options or {}),
         "t": found.t,
         "x": found.x,
-        "curve": _in_rig_axes(law, law.curve(found.t)),
+        "curve": np.hstack([part @ turn for part in states]),
         "tracks": list(found.tracks),
         "residuals": missed,
     }
     return {key: as_json(value, f"found[{key!r}]") for key, value in content.items()}
-
-
-def _in_rig_axes(law: Discovery, curve: Floats) -> Floats:
-    """States of a law, (n, d), in the axes of the rig, its own being turned or not."""
-    if law.orientation is None:
-        return curve
-    return np.hstack([part @ law.orientation for part in np.split(curve, law.system.order, axis=1)])
 
 
 def _shot(found: VideoDiscovery, paths: Sequence[str | Path] | None, i: int) -> VideoInfo:
@@ -338,11 +318,11 @@ def _shot(found: VideoDiscovery, paths: Sequence[str | Path] | None, i: int) -> 
 
 def _law(found: Discovery, frame: str) -> dict[str, object]:
     """One form of the law: as text, and term by term."""
-    law, deviations = found.native, found.native_standard_errors
-    origin, errors = found.offset, found.offset_errors
-    if frame == "data":
-        law, deviations = found.system, found.standard_errors
-        origin = errors = np.zeros(law.d)
+    law, deviations = found.system, found.standard_errors
+    origin = errors = np.zeros(law.d)
+    if frame == "native":
+        law, deviations = found.native, found.native_standard_errors
+        origin, errors = found.offset, found.offset_errors
     terms = [
         {
             "equation": side, "term": law.terms[row],
@@ -384,47 +364,34 @@ def _page(
     """The report as one HTML page."""
     total = 2 + (paths is not None) + 2 * (len(found.rig.cameras) > 1)
     figures = bar(progress, "report", iterable=_figures(found, paths), total=total)
-    about = {
-        "note": found.rig.note, "driven": found.driven, "limit": DISAGREEMENT,
-        "data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS,
-    }  # fmt: skip
-    about |= {"unit": getattr(found, "unit", "scene units")}  # metres or pixels of one camera
-    law = found.discovery
-    about |= {"axes": law.axes, "swing": "" if found.swing is None else str(found.swing)}
-    noises = zip(law.system.names, law.noise, strict=False)  # of velocities there is none
-    about |= {"noises": [(name, value) for name, value in noises if np.isfinite(value)]}
-    about |= {"physics": str(law.physics()) if law.system.order == 2 else ""}
     film = None if paths is None else base64.b64encode(law_over_videos(found, paths)).decode()
-    return page("report.html", figures=figures, film=film, **about, **content)
+    drawn = {"figures": figures, "film": film, "limit": DISAGREEMENT}
+    return page("report.html", found=found, **drawn, **content)
 
 
 def _figures(
     found: VideoDiscovery, paths: Sequence[str | Path] | None
 ) -> Iterator[tuple[str, str]]:
     """The figures one after the other, each a PNG in base64, by their names in the template."""
-    # The first use of pyplot switches the figures of a notebook on, the end of a style whatever was
-    # switched on meanwhile off again: so this comes first.
-    plt.draw_if_interactive()
-    with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
-        # Several targets are drawn as one that begins again.
-        t = stacked(np.tile(found.t[:, None], found.targets), 1)[:, 0]
-        x = stacked(found.x, 3)
-        d = 3 if np.nan_to_num(x)[:, 2].any() else 2  # in the plane of one camera
-        curves = {"reconstructed": x[:, :d]}
-        curves["curve that obeys the law"] = stacked(found.fitted, 3)[:, :d]
-        yield "path", _encoded(plot_path(t, curves, "not seen"))
-        seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
-        if seen.any() and paths is not None:
-            instant = int(seen.argmax())
-            shown = [found.lags.frame_at(i, instant) for i in range(len(paths))]
-            images = [read_frame(path, frame) for path, frame in zip(paths, shown, strict=True)]
-            names = _names(paths, len(paths))
-            yield "look", _encoded(_look(images, names, shown, found.tracks, instant))
-        if len(found.rig.cameras) > 1:
-            yield "rig", _encoded(plot_rig(found.rig, x))
-            missed = [stacked(one, 2) for one in found.residuals]
-            yield "residuals", _encoded(plot_residuals(t, missed, DISAGREEMENT))
-        yield "plateaus", _encoded(found.discovery.plot_path())
+    # Several targets are drawn as one that begins again.
+    t = stacked(np.tile(found.t[:, None], found.targets), 1)[:, 0]
+    x = stacked(found.x, 3)
+    d = 3 if np.nan_to_num(x)[:, 2].any() else 2  # in the plane of one camera
+    curves = {"reconstructed": x[:, :d]}
+    curves["curve that obeys the law"] = stacked(found.fitted, 3)[:, :d]
+    yield "path", _picture(plot_path, t, curves, "not seen")
+    seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
+    if seen.any() and paths is not None:
+        instant = int(seen.argmax())
+        shown = [found.lags.frame_at(i, instant) for i in range(len(paths))]
+        images = [read_frame(path, frame) for path, frame in zip(paths, shown, strict=True)]
+        names = _names(paths, len(paths))
+        yield "look", _picture(_look, images, names, shown, found.tracks, instant)
+    if len(found.rig.cameras) > 1:
+        yield "rig", _picture(plot_rig, found.rig, x)
+        missed = [stacked(one, 2) for one in found.residuals]
+        yield "residuals", _picture(plot_residuals, t, missed, DISAGREEMENT)
+    yield "plateaus", _picture(found.discovery.plot_path)
 
 
 def _look(
@@ -448,11 +415,16 @@ def _short(name: str, i: int) -> str:
     return fitting.replace("$", r"\$")
 
 
-def _encoded(figure: Figure) -> str:
-    """A figure as text, closed."""
+def _picture(plot: Callable[..., Figure], *shown: object) -> str:
+    """What a function plots, as a PNG in base64."""
+    # The first use of pyplot switches the figures of a notebook on, the end of a style whatever was
+    # switched on meanwhile off again: so this comes first.
+    plt.draw_if_interactive()
     image = io.BytesIO()
-    figure.savefig(image, format="png", dpi=110)
-    plt.close(figure)
+    with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
+        figure = plot(*shown)
+        figure.savefig(image, format="png", dpi=110)
+        plt.close(figure)
     return base64.b64encode(image.getvalue()).decode()
 
 
