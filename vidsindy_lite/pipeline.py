@@ -482,26 +482,18 @@ def _rig_warnings(
     They miss it by `missed` pixels. The tracks are those at the lags, `best` are the lags that the
     tracks themselves tell.
     """
-    wrong_lag = _apart(lags, best, _OTHER_LAG)
-    if wrong_lag and max(missed) <= cameras.DISAGREEMENT:
-        return [
-            "the lags that are given differ from those of the tracks: "
-            f"({cameras.list_lags(lags)}) for ({cameras.list_lags(best.frames)}) frames: "
-            "leave them out, or check"
-        ]
-    sizes = ", ".join(f"{size:.1f}" for size in missed)
-    apart = (
-        f"in one frame of ten, tracked and reconstructed target lie more than {sizes} pixels apart"
-    )
-    if wrong_lag:  # by too little to refuse them
-        return [
-            f"the rig does not agree with the tracks at the lags that are given: {apart}: the lags "
-            f"({cameras.list_lags(best.frames)}) would explain it best"
-        ]
-    why = cameras.explain(tracks, given, learned)
-    worst = max(missed)
+    told, worst, where = f"({cameras.list_lags(best.frames)})", max(missed), ""
     few = worst <= cameras.GROSS
-    if why is not None and (few or why.left <= max(cameras.GROSS / 2, worst / 3)):
+    if _apart(lags, best, _OTHER_LAG):  # by too little to refuse them
+        if worst <= cameras.DISAGREEMENT:
+            return [
+                "the lags that are given differ from those of the tracks: "
+                f"({cameras.list_lags(lags)}) for {told} frames: leave them out, or check"
+            ]
+        advice, where = f"the lags {told} would explain it best", " at the lags that are given"
+    elif (why := cameras.explain(tracks, given, learned)) is not None and (
+        few or why.left <= max(cameras.GROSS / 2, worst / 3)
+    ):
         advice = f"{why.text(names)} would explain it best"
     elif not few and cameras.smooth(tracks, learned):
         advice = (
@@ -513,7 +505,11 @@ def _rig_warnings(
         )
     else:
         return []
-    return [f"the rig does not agree with the tracks: {apart}: {advice}"]
+    sizes = ", ".join(f"{size:.1f}" for size in missed)
+    return [
+        f"the rig does not agree with the tracks{where}: in one frame of ten, tracked and "
+        f"reconstructed target lie more than {sizes} pixels apart: {advice}"
+    ]
 
 
 # ---------------------------------------------------------------------------------------- the law
@@ -576,7 +572,20 @@ class VideoDiscovery(Observation):
     @property
     def driven(self) -> str:
         """Which of several targets drive which others, and by what terms; empty for one target."""
-        return _driven(self.discovery.system) if self.targets > 1 else ""
+        if self.targets == 1:
+            return ""
+        law = self.discovery.system
+        target = np.arange(law.d) % (law.d // law.order) // 3 + 1  # of places, and of velocities
+        by: dict[tuple[int, int], list[str]] = {}
+        for j, side in law.sides().items():
+            for row in np.flatnonzero(law.support[:, j]):
+                for other in set(target[law.exponents[row, : law.d] > 0]) - {target[j]}:
+                    pair = int(other), int(target[j])
+                    by.setdefault(pair, []).append(f"{law.terms[row]} in {side}")
+        free = [str(i) for i in np.unique(target) if all(i != driven for _, driven in by)]
+        said = [f"{i} drives {j} by {', '.join(terms)}" for (i, j), terms in sorted(by.items())]
+        alone = f"{' and '.join(free)} {'moves' if len(free) == 1 else 'move'} independently"
+        return "; ".join([alone] * bool(free) + said)
 
     def __str__(self) -> str:
         warnings = (f"warning: {text}" for text in self.warnings)
@@ -716,21 +725,6 @@ def _checked(
     return {"library": terms, "seed": seed} | chosen, unasked
 
 
-def _driven(law: dynamics.PolynomialSystem) -> str:
-    """Which of several targets, of three coordinates each, drive which others by what terms."""
-    target = np.arange(law.d) % (law.d // law.order) // 3 + 1  # of places, and of velocities
-    by: dict[tuple[int, int], list[str]] = {}
-    for j, side in law.sides().items():
-        for row in np.flatnonzero(law.support[:, j]):
-            for other in set(target[law.exponents[row, : law.d] > 0]) - {target[j]}:
-                pair = int(other), int(target[j])
-                by.setdefault(pair, []).append(f"{law.terms[row]} in {side}")
-    free = [str(i) for i in np.unique(target) if all(i != driven for _, driven in by)]
-    said = [f"{i} drives {j} by {', '.join(terms)}" for (i, j), terms in sorted(by.items())]
-    alone = f"{' and '.join(free)} {'moves' if len(free) == 1 else 'move'} independently"
-    return "; ".join([alone] * bool(free) + said)
-
-
 def _read(
     tracks: Sequence[ArrayLike | str | os.PathLike], rig: Rig, individual: str | None
 ) -> list[TrackFile]:
@@ -811,7 +805,16 @@ _STILL = 2.0  # pixels; ... or one that stays within that, ...
 _SPARSE = 0.5  # ... or of a target that is seen in fewer frames than that, may be of something else
 
 
-class Refused(ValueError):
+class _Ended(BaseException):
+    """An exception that holds what there is already."""
+
+    def __init__(self, message: str, step: str, tracks: Sequence[Floats]) -> None:
+        super().__init__(message)
+        self.step = step
+        self.tracks = tuple(tracks)
+
+
+class Refused(_Ended, ValueError):
     """Tracks from which no path or law can be had.
 
     Parameters
@@ -823,19 +826,9 @@ class Refused(ValueError):
         Pixels of the target in each video up to there.
     """
 
-    def __init__(self, message: str, step: str, tracks: Sequence[Floats]) -> None:
-        super().__init__(message)
-        self.step = step
-        self.tracks = tuple(tracks)
 
-
-class Stopped(KeyboardInterrupt):
+class Stopped(_Ended, KeyboardInterrupt):
     """An interruption when there were tracks already; see `Refused`."""
-
-    def __init__(self, step: str, tracks: Sequence[Floats]) -> None:
-        super().__init__("stopped before there was a law")
-        self.step = step
-        self.tracks = tuple(tracks)
 
 
 @contextmanager
@@ -849,7 +842,7 @@ def refusing(step: str, tracks: Sequence[Floats], names: Sequence[str]) -> Itera
     except (Refused, Stopped):
         raise
     except KeyboardInterrupt:
-        raise Stopped(step, tracks) from None
+        raise Stopped("stopped before there was a law", step, tracks) from None
     except ValueError as error:
         message = f"{error}; likely causes, in this order: {_likely_causes(step, tracks, names)}"
         raise Refused(message, step, tracks) from None

@@ -34,7 +34,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
-from ..storage import library_versions, repository_root, write_file
+from ..storage import library_versions, repository_root, write_file, write_files
 from ..values import as_json
 from .report import page
 
@@ -101,7 +101,7 @@ def save_figure(
     """
     record = _record(figure_id, "figure", caption, "numbers", numbers, tolerance)
     record["words"] = _words(figure)
-    _write(record, ".png", _png(figure))
+    _write(record, _png(figure))
 
 
 def save_animation(
@@ -135,7 +135,7 @@ def save_animation(
     )
     durations, file = [PICTURE] * len(rest) + [3000], io.BytesIO()
     first.save(file, "GIF", save_all=True, append_images=rest, duration=durations, loop=0)
-    _write(record, ".gif", file.getvalue())
+    _write(record, file.getvalue())
 
 
 def save_slider(
@@ -315,8 +315,8 @@ def _record(
     }
 
 
-def _write(record: dict, suffix: str = "", picture: bytes = b"") -> None:
-    """Write a picture, then its record, a line per entry and per row."""
+def _write(record: dict, *picture: bytes) -> None:
+    """Write a record, a line per entry and per row, and its picture."""
 
     def entry(value: object) -> str:
         if isinstance(value, dict) and value:
@@ -326,11 +326,10 @@ def _write(record: dict, suffix: str = "", picture: bytes = b"") -> None:
             return "[\n" + ",\n".join(f"  {json.dumps(item)}" for item in value) + "\n ]"
         return json.dumps(value)
 
-    folder = figures_folder()
-    if picture:
-        write_file(folder / f"{record['id']}{suffix}", picture)
     lines = (f" {json.dumps(key)}: {entry(value)}" for key, value in record.items())
-    write_file(folder / f"{record['id']}.json", ("{\n" + ",\n".join(lines) + "\n}\n").encode())
+    text = "{\n" + ",\n".join(lines) + "\n}\n"
+    contents = zip(files_of(record), (text.encode(), *picture), strict=True)
+    write_files({figures_folder() / name: content for name, content in contents})
 
 
 def read_records(folder: Path) -> dict[str, dict]:

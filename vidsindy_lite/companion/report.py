@@ -20,7 +20,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import cast
+from typing import TypeAlias, cast
 
 import av
 import cv2
@@ -33,7 +33,7 @@ from matplotlib.font_manager import findfont, get_font
 from ..arrays import Floats, Image
 from ..cameras import DISAGREEMENT, Rig, stacked
 from ..checks import check_path
-from ..dynamics import Discovery, Quantity, Swing
+from ..dynamics import Discovery, Swing
 from ..pipeline import Refused, Stopped, VideoDiscovery
 from ..progress import bar
 from ..storage import write_file, write_files
@@ -44,7 +44,6 @@ from ..vision import VideoInfo, pick_frames, read_frame, video_info
 LETTERS = "abcdefgh"  # of several targets, in the heads of tracks
 LONGEST_NAME = 30  # characters above a picture
 PAGE, DATA, RIG, TRACKS = FILES = ("report.html", "result.json", "rig.toml", "tracks.csv")
-_OF_CAMERA = ("model", "position", "normal", "scale", "scale_error", "angle", "homography")
 FORMAT = 1  # of result.json: counts up when what is in it changes its meaning
 
 _TITLES = ("<title>Law of a moving target", "<title>No law: ")  # of pages that are ours
@@ -70,6 +69,10 @@ _PAGES = jinja2.Environment(
     keep_trailing_newline=True,
 )
 _PAGES.globals |= {"data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS}
+
+
+Videos: TypeAlias = Sequence[str | Path] | None
+Options: TypeAlias = Mapping[str, object] | None
 
 
 def page(template: str, **values: object) -> str:
@@ -135,9 +138,9 @@ def check_folder_is_free(folder: str | Path) -> Path:
 
 def write_report(
     found: VideoDiscovery,
-    paths: Sequence[str | Path] | None,
+    paths: Videos,
     folder: str | Path,
-    options: Mapping[str, object] | None = None,
+    options: Options = None,
     progress: bool | None = None,
 ) -> Path:
     """Write the report on a law.
@@ -176,10 +179,10 @@ def write_report(
 
 def write_refusal(
     refused: Refused | Stopped,
-    paths: Sequence[str | Path] | None,
+    paths: Videos,
     rig: Rig | None,
     folder: str | Path,
-    options: Mapping[str, object] | None = None,
+    options: Options = None,
 ) -> Path:
     """Write what is known where no law was found: the tracks over the videos, and what failed.
 
@@ -248,16 +251,12 @@ def _data(
     return {DATA: text, TRACKS: table.getvalue().replace("nan", "")}
 
 
-def _names(paths: Sequence[str | Path] | None, count: int) -> list[str]:
+def _names(paths: Videos, count: int) -> list[str]:
     """What the videos are called."""
     return [f"camera {i + 1}" if paths is None else Path(paths[i]).name for i in range(count)]
 
 
-def summary(
-    found: VideoDiscovery,
-    paths: Sequence[str | Path] | None,
-    options: Mapping[str, object] | None = None,
-) -> dict[str, object]:
+def summary(found: VideoDiscovery, paths: Videos, options: Options = None) -> dict[str, object]:
     """All that the report tells, as plain data for JSON; None in place of NaN.
 
     Parameters
@@ -273,9 +272,9 @@ def summary(
         length = np.linalg.norm(missed[i].reshape(-1, 2), axis=1)
         length = length[np.isfinite(length)]
         cameras.append({
-            "video": names[i], "frames": shot.frames, "fps": shot.fps,
-            "image_size": list(shot.size),
-            **{name: getattr(camera, name, None) for name in _OF_CAMERA},
+            "video": names[i], "frames": shot.frames, "fps": shot.fps, "image_size": shot.size,
+            **_parts(camera, "model", "position", "normal", "scale", "scale_error", "angle"),
+            **_parts(camera, "homography"),
             "lag": found.lags.frames[i], "lag_error": found.lags.errors[i],
             "share_of_frames_seen": seen.mean(),
             "residual_rms": np.sqrt(np.mean(length**2)) if len(length) else np.nan,
@@ -294,8 +293,8 @@ def summary(
             "orientation": law.orientation,
             "swing": None if found.swing is None else _swing(found.swing),
         },
-        "g": _quantity(found.g),
-        "period": _quantity(found.period),
+        "g": found.g and _parts(found.g, "value", "error"),
+        "period": found.period and _parts(found.period, "value", "error"),
         "noise": law.noise,
         "cameras": cameras,
         "options": dict(options or {}),
@@ -308,7 +307,7 @@ def summary(
     return {key: as_json(value, f"found[{key!r}]") for key, value in content.items()}
 
 
-def _shot(found: VideoDiscovery, paths: Sequence[str | Path] | None, i: int) -> VideoInfo:
+def _shot(found: VideoDiscovery, paths: Videos, i: int) -> VideoInfo:
     """What is known of a video, or of the track that there is in its place."""
     if paths is not None:
         return video_info(paths[i])
@@ -337,19 +336,17 @@ def _law(found: Discovery, frame: str) -> dict[str, object]:
 
 def _swing(swing: Swing) -> dict[str, object]:
     """A circle and the law of the angle on it."""
-    circle, g = swing.circle, swing.g
     return {
-        "centre": circle.centre, "centre_errors": circle.centre_errors,
-        "radius": circle.radius, "radius_error": circle.radius_error,
+        **_parts(swing.circle, "centre", "centre_errors", "radius", "radius_error"),
         "equations": swing.law.equations(),
-        "g": None if g is None else g.value, "g_error": None if g is None else g.error,
-        "warnings": [*circle.warnings, *swing.law.warnings],
+        "g": getattr(swing.g, "value", None), "g_error": getattr(swing.g, "error", None),
+        "warnings": [*swing.circle.warnings, *swing.law.warnings],
     }  # fmt: skip
 
 
-def _quantity(found: Quantity | None) -> dict[str, object] | None:
-    """A number with its error."""
-    return None if found is None else {"value": found.value, "error": found.error}
+def _parts(whole: object, *names: str) -> dict[str, object]:
+    """Attributes by their names; None where there is none."""
+    return {name: getattr(whole, name, None) for name in names}
 
 
 # ---------------------------------------------------------------------------------------- the page
@@ -357,7 +354,7 @@ def _quantity(found: Quantity | None) -> dict[str, object] | None:
 
 def _page(
     found: VideoDiscovery,
-    paths: Sequence[str | Path] | None,
+    paths: Videos,
     content: Mapping[str, object],
     progress: bool | None = None,
 ) -> str:
@@ -369,9 +366,7 @@ def _page(
     return page("report.html", found=found, **drawn, **content)
 
 
-def _figures(
-    found: VideoDiscovery, paths: Sequence[str | Path] | None
-) -> Iterator[tuple[str, str]]:
+def _figures(found: VideoDiscovery, paths: Videos) -> Iterator[tuple[str, str]]:
     """The figures one after the other, each a PNG in base64, by their names in the template."""
     # Several targets are drawn as one that begins again.
     t = stacked(np.tile(found.t[:, None], found.targets), 1)[:, 0]
