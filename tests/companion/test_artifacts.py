@@ -61,6 +61,7 @@ def test_figure_and_numbers_are_written_the_same_twice(folder, figure):
         }  # fmt: skip
     assert plt.fignum_exists(figure.number)
     assert b"Matplotlib" not in contents(folder)["fig_2.png"]
+    assert min(Image.open(folder / "fig_2.png").convert("RGB").getpixel((0, 0))) > 252  # white
 
 
 def test_animation_is_the_same_bytes_twice(folder):

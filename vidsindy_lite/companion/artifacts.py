@@ -41,7 +41,7 @@ from .report import page
 INDEX = "README.md"
 DIGITS = 6  # of the numbers in the records
 PICTURE = 83  # milliseconds that one of an animation stays
-SAMPLED = 20_000  # pixels of a picture that have a say in its palette
+PALETTE = Image.Quantize.FASTOCTREE  # a small target keeps its colour, and so does white
 SLIDER_DPI = 100  # dots per inch of its frames
 PICTURES = {"figure": [".png"], "animation": [".gif"], "table": []}  # files of a kind
 
@@ -128,11 +128,9 @@ def save_animation(
         As `save_figure` does.
     """
     record = _record(animation_id, "animation", caption, "numbers", numbers, None)
-    palette = _palette(np.concatenate(pictures))
-    first, *rest = (
-        Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
-        for picture in pictures
-    )
+    palette = Image.fromarray(np.concatenate(pictures)).quantize(256, PALETTE)
+    images = (Image.fromarray(picture) for picture in pictures)
+    first, *rest = (one.quantize(palette=palette, dither=Image.Dither.NONE) for one in images)
     durations, file = [PICTURE] * len(rest) + [3000], io.BytesIO()
     first.save(file, "GIF", save_all=True, append_images=rest, duration=durations, loop=0)
     _write(record, file.getvalue())
@@ -184,25 +182,8 @@ def save_slider(
 def with_palette(png: bytes) -> bytes:
     """A PNG with 256 colours, a third of the size; as it was if that is not smaller."""
     image, small = Image.open(io.BytesIO(png)).convert("RGB"), io.BytesIO()
-    reduced = image.quantize(palette=_palette(np.asarray(image)), dither=Image.Dither.NONE)
-    reduced.save(small, "PNG", optimize=True)
+    image.quantize(256, PALETTE).save(small, "PNG", optimize=True)
     return min(png, small.getvalue(), key=len)
-
-
-def _palette(pixels: np.ndarray) -> Image.Image:
-    """256 colours for a picture: as far apart as its own, then moved to where its pixels are.
-
-    Of colours that differ by less than eight grey levels the most frequent is a candidate, however
-    rare: a small target keeps its colour, and noise has few enough to choose from quickly.
-    """
-    flat = pixels.reshape(-1, 3)
-    codes, counts = np.unique(flat @ np.array([1 << 16, 1 << 8, 1]), return_counts=True)
-    codes = codes[np.argsort(-counts, kind="stable")]
-    _, firsts = np.unique(codes & 0xF8F8F8, return_index=True)
-    colours = np.stack([codes >> 16, codes >> 8, codes], axis=-1)[firsts].astype(np.uint8)
-    some = flat[:: max(1, len(flat) // SAMPLED)]
-    strip = Image.fromarray(np.concatenate([colours, some])[None])
-    return strip.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=1)
 
 
 def _png(figure: Figure) -> bytes:
