@@ -572,20 +572,7 @@ class VideoDiscovery(Observation):
     @property
     def driven(self) -> str:
         """Which of several targets drive which others, and by what terms; empty for one target."""
-        if self.targets == 1:
-            return ""
-        law = self.discovery.system
-        target = np.arange(law.d) % (law.d // law.order) // 3 + 1  # of places, and of velocities
-        by: dict[tuple[int, int], list[str]] = {}
-        for j, side in law.sides().items():
-            for row in np.flatnonzero(law.support[:, j]):
-                for other in set(target[law.exponents[row, : law.d] > 0]) - {target[j]}:
-                    pair = int(other), int(target[j])
-                    by.setdefault(pair, []).append(f"{law.terms[row]} in {side}")
-        free = [str(i) for i in np.unique(target) if all(i != driven for _, driven in by)]
-        said = [f"{i} drives {j} by {', '.join(terms)}" for (i, j), terms in sorted(by.items())]
-        alone = f"{' and '.join(free)} {'moves' if len(free) == 1 else 'move'} independently"
-        return "; ".join([alone] * bool(free) + said)
+        return _driven(self.discovery.system) if self.targets > 1 else ""
 
     def __str__(self) -> str:
         warnings = (f"warning: {text}" for text in self.warnings)
@@ -723,6 +710,21 @@ def _checked(
     chosen = {"order": order, "origin": origin, "orientation": orientation}
     unasked = degree is None and library is None and order == "auto"
     return {"library": terms, "seed": seed} | chosen, unasked
+
+
+def _driven(law: dynamics.PolynomialSystem) -> str:
+    """Which of several targets, of three coordinates each, drive which others by what terms."""
+    target = np.arange(law.d) % (law.d // law.order) // 3 + 1  # of places, and of velocities
+    by: dict[tuple[int, int], list[str]] = {}
+    for j, side in law.sides().items():
+        for row in np.flatnonzero(law.support[:, j]):
+            for other in set(target[law.exponents[row, : law.d] > 0]) - {target[j]}:
+                pair = int(other), int(target[j])
+                by.setdefault(pair, []).append(f"{law.terms[row]} in {side}")
+    free = [str(i) for i in np.unique(target) if all(i != driven for _, driven in by)]
+    said = [f"{i} drives {j} by {', '.join(terms)}" for (i, j), terms in sorted(by.items())]
+    alone = f"{' and '.join(free)} {'moves' if len(free) == 1 else 'move'} independently"
+    return "; ".join([alone] * bool(free) + said)
 
 
 def _read(
