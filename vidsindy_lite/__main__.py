@@ -133,13 +133,11 @@ def _discover(options: argparse.Namespace) -> int:
     from .companion.report import PAGE, check_folder_is_free, write_refusal, write_report
     from .dynamics import Library, check_library
     from .pipeline import Refused, Stopped
-    from .vision import check_detector
 
     if options.library is not None:
         options.library = Library.parse(options.library)
     if bool(options.videos) == bool(options.tracks):
         raise ValueError("videos: give either one video per camera, or --tracks")
-    check_detector(options.detector)
     check_folder_is_free(options.out)
     if options.rig is None and len(options.videos) in (0, 2):
         raise ValueError("rig: must be given for tracks or two videos, got none")

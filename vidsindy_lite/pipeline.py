@@ -10,6 +10,7 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import chain, repeat
 from pathlib import Path
 from typing import Any, cast
 
@@ -620,7 +621,7 @@ def discover_from_videos(
         See `observe` and `discover`. What can be told before a video is tracked is.
     """
     check_integer("targets", targets, least=1)
-    how, unasked = _checked(degree, library, order, origin, orientation, seed, targets)
+    how, unasked = checked(degree, library, order, origin, orientation, seed, 3 * targets)
     how |= {"progress": progress}
     seen = observe(
         paths, rig, t, lags=lags, detector=detector, hints=hints, targets=targets,
@@ -677,7 +678,7 @@ def discover_from_tracks(
         If a file is missing or holds no track, if times are given twice or not at all, or as
         `observe_tracks` and `discover` do.
     """
-    how, unasked = _checked(degree, library, order, origin, orientation, seed)
+    how, unasked = checked(degree, library, order, origin, orientation, seed)
     how |= {"progress": progress}
     check_instance("rig", rig, Rig)
     read = _read(tracks, rig, individual)
@@ -689,14 +690,14 @@ def discover_from_tracks(
     return _with_law(seen, names, how, unasked)
 
 
-def _checked(
+def checked(
     degree: int | None,
     library: Library | None,
     order: int | str,
     origin: str,
     orientation: str,
     seed: int,
-    targets: int = 1,
+    coordinates: int = 3,
 ) -> tuple[dict[str, Any], bool]:
     """What `discover` takes beside the path, checked before anything is tracked.
 
@@ -704,8 +705,8 @@ def _checked(
     """
     terms = dynamics.check_library(degree, library)
     dynamics.check_order(order, origin)
-    dynamics.check_orientation(orientation, terms, 3 * targets, origin)
-    dynamics.Form.of(dynamics.variable_names(3 * targets), terms, 2 if order == 2 else 1)
+    dynamics.check_orientation(orientation, terms, coordinates, origin)
+    dynamics.Form.of(dynamics.variable_names(coordinates), terms, 2 if order == 2 else 1)
     check_integer("seed", seed)
     chosen = {"order": order, "origin": origin, "orientation": orientation}
     unasked = degree is None and library is None and order == "auto"
@@ -742,14 +743,11 @@ def _read(
             read.append(TrackFile(name, check_rows(name, cast("ArrayLike", given), 2), None))
     # Files that count frames from the start of their videos may begin at different ones.
     first = min((track.start for track in read), default=0)
-    for i, (one, camera) in enumerate(zip(read, rig.cameras, strict=False)):
-        read[i] = replace(one, pixels=one.downwards(camera.image_size[1]))
-    return [
-        replace(
-            one, pixels=np.pad(one.pixels, ((one.start - first, 0), (0, 0)), constant_values=np.nan)
-        )
-        for one in read
-    ]
+    heights = chain((camera.image_size[1] for camera in rig.cameras), repeat(0))
+    for i, (one, height) in enumerate(zip(read, heights, strict=False)):
+        rows = (one.start - first, 0), (0, 0)
+        read[i] = replace(one, pixels=np.pad(one.downwards(height), rows, constant_values=np.nan))
+    return read
 
 
 def _times(

@@ -16,19 +16,9 @@ import numpy as np
 
 from .arrays import Floats
 from .cameras import Lags, OrthographicCamera, Rig
-from .checks import check_array, check_integer, check_number, check_positive, check_vector, shown
-from .dynamics import (
-    Discovery,
-    Round,
-    Swing,
-    check_library,
-    check_order,
-    discover,
-    homogeneous,
-    on_circle,
-    smooth,
-)
-from .pipeline import VideoDiscovery, check_found, refusing
+from .checks import check_array, check_number, check_positive, check_vector, shown
+from .dynamics import Discovery, Round, Swing, discover, homogeneous, on_circle, smooth
+from .pipeline import VideoDiscovery, check_found, checked, refusing
 from .vision import Hint, check_detector, frame_clock, track, video_info
 
 MARK = 1.0
@@ -162,9 +152,7 @@ def discover_from_video(
     >>> print(found, found.g)
     """
     check_detector(detector)
-    check_order(order, "learn")
-    check_library(degree, None)
-    check_integer("seed", seed)
+    checked(degree, None, order, "learn", "data", seed, 2)
     share = check_number("length_error", length_error)
     if not 0 <= share < 1:
         raise ValueError(f"length_error: must be a share of the length, 0 to 1, got {share}")

@@ -19,6 +19,7 @@ import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from itertools import pairwise
 from pathlib import Path
 from typing import TypeAlias, cast
 
@@ -467,14 +468,12 @@ def _view(found: VideoDiscovery, path: Path, i: int, instants: range) -> Iterato
     scale = _HEIGHT / height
     size = 2 * round(width * scale / 2), _HEIGHT
     numbers = [found.lags.frame_at(i, k) for k in instants]
-    known = sorted({number for number in numbers if number >= 0})
-    small = {
-        number: cast("Image", cv2.resize(frame, size, interpolation=cv2.INTER_AREA))
-        for number, frame in zip(known, pick_frames(path, known), strict=False)
-    }
-    grey = np.full((_HEIGHT, size[0], 3), 128, np.uint8)
-    for j, number in enumerate(numbers):
-        shown = small.get(number, grey)
+    frames = pick_frames(path, sorted({number for number in numbers if number >= 0}))
+    grey = image = np.full((height, width, 3), 128, np.uint8)
+    for j, (before, number) in enumerate(pairwise([-1, *numbers])):
+        if number > max(before, -1):
+            image = next(frames, grey)
+        shown = cast("Image", cv2.resize(image, size, interpolation=cv2.INTER_AREA))
         for trail in pixels[:, instants[max(j - _TRAIL, 0)] : instants[j] + 1]:
             shown = _drawn(shown, (trail + 0.5) * scale - 0.5, spread * scale)
         yield shown
