@@ -105,7 +105,7 @@ def test_the_command_passes_targets_and_order_on(
     main(["discover", *map(str, films[0]), *options, "--targets", "2", "--order", order])
     assert f"called with 2 and {given!r}" in capsys.readouterr().err
     assert main(["discover", "--tracks", "a.csv", *options, "--targets", "2"]) == 2
-    assert "targets: must be 1 with --tracks" in capsys.readouterr().err
+    assert "targets: must be given with several videos, got 2" in capsys.readouterr().err
 
 
 def test_laws_of_second_order_name_their_targets_by_places_and_velocities():

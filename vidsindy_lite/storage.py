@@ -39,17 +39,21 @@ _HEAD = 4096  # characters that tell text from what is none
 
 
 @contextmanager
-def reading(name: str, path: Path) -> Iterator[None]:
-    """Whatever the content of a file makes a reader raise, as one line that names the file."""
+def reading(name: str, path: Path, kind: str | None = None) -> Iterator[None]:
+    """Whatever the content of a file makes a reader raise, as one line that names the file.
+
+    And what kind of file it has to be, if that is what is wrong with it.
+    """
     try:
         yield
-    except MALFORMED as error:
-        first = (str(error).splitlines() or [""])[0]
+    except (*MALFORMED, cv2.error) as error:
+        first = (str(error).splitlines() or [""])[0] or type(error).__name__
         if isinstance(error, RecursionError):
-            first = "must not be nested so deeply"
-        elif not isinstance(error, ValueError):
+            first = f"must be nested {DEEPEST} levels deep at most"
+        elif kind is None and not isinstance(error, ValueError):
             first = f"must not be malformed ({type(error).__name__}: {first:.60})"
-        raise ValueError(f"{name}: {first}, in '{path}'") from error
+        told = f"{first}, in '{path}'" if kind is None else f"must be {kind}, got '{path}': {first}"
+        raise ValueError(f"{name}: {told}") from error
 
 
 def check_file(name: str, path: str | os.PathLike, what: str = "file") -> Path:
@@ -120,24 +124,18 @@ def read_tree(name: str, path: Path, suffix: str) -> Any:
     """
     kind = f"a {suffix[1:].upper()} file"
     text = read_text(name, path, kind)
-    try:
+    with reading(name, path, kind):
         if suffix == ".json" and '"opencv-matrix"' not in text:
             return json.loads(text)
         if _depth(text, suffix) > DEEPEST:
             raise RecursionError
         if suffix == ".toml":
             return tomllib.loads(text)
-        memory = cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY
-        storage = cv2.FileStorage(text, memory)
+        storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         try:
             return _plain(storage.root())
         finally:
             storage.release()
-    except (*MALFORMED, cv2.error) as error:
-        first = (str(error).splitlines() or [""])[0] or type(error).__name__
-        if isinstance(error, RecursionError):
-            first = f"it must be nested {DEEPEST} levels deep at most"
-        raise ValueError(f"{name}: must be {kind}, got '{path}': {first}") from None
 
 
 def _depth(text: str, suffix: str) -> int:
@@ -183,15 +181,9 @@ def read_arrays(name: str, path: Path) -> Any:
     ValueError
         If it is none.
     """
-    try:
-        with open(path, "rb") as file:
-            loaded = np.load(file)
-            return loaded if isinstance(loaded, np.ndarray) else dict(loaded)
-    except MALFORMED as error:
-        first = (str(error).splitlines() or [""])[0] or type(error).__name__
-        raise ValueError(
-            f"{name}: must be a {path.suffix} file of numbers, got '{path}': {first:.80}"
-        ) from None
+    with reading(name, path, f"a {path.suffix} file of numbers"), open(path, "rb") as file:
+        loaded = np.load(file)
+        return loaded if isinstance(loaded, np.ndarray) else dict(loaded)
 
 
 # ------------------------------------------------------------------------------------------ written
