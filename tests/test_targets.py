@@ -126,7 +126,7 @@ def test_laws_of_second_order_name_their_targets_by_places_and_velocities():
         ({"targets": 0}, "targets: must be an integer of at least 1"),
         ({"detector": "learned"}, "targets: 2 are found by detector='auto' alone"),
         ({"hints": [vl.Hint(frame=0, box=(1, 1, 9, 9)), None, None]}, "targets: 2 are found by"),
-        ({"rig": None}, "rig: must be given to tell 2 targets apart, got None"),
+        ({"rig": None}, "targets: 2 need three cameras .* got 0 of known ones"),
         ({"targets": 1, "hints": [None]}, r"hints: must be one per video \(3\) or None, got"),
     ],
 )

@@ -402,13 +402,11 @@ def _check_several(
     targets: int, rig: Rig | None, detector: str | os.PathLike, hints: Sequence[Hint | None] | None
 ) -> None:
     """That several targets can be told apart."""
-    if rig is None:
-        raise ValueError(f"rig: must be given to tell {targets} targets apart, got None")
-    if len(rig.cameras) < 3 or not rig.is_measured:
-        known = "known" if rig.is_measured else "unknown"
+    known = len(rig.cameras) if rig is not None and rig.is_measured else 0
+    if known < 3:
         raise ValueError(
-            f"targets: {targets} need three cameras of known places and directions, got "
-            f"{len(rig.cameras)} of {known} ones"
+            f"targets: {targets} need three cameras of known places and directions, got {known} "
+            "of known ones"
         )
     if detector != "auto" or any(hints or ()):
         raise ValueError(

@@ -64,11 +64,7 @@ def check_file(name: str, path: str | os.PathLike, what: str = "file") -> Path:
     FileNotFoundError, ValueError
     """
     file = check_path(name, path)
-    try:
-        found = file.is_file()
-    except ValueError:  # no system has names with null characters
-        found = False
-    if not found:
+    if not file.is_file():
         raise FileNotFoundError(f"{name}: no such {what}, got '{path}'")
     return file
 
