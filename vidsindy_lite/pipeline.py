@@ -155,7 +155,9 @@ def observe(
     check_integer("targets", targets, least=1)
     if targets > 1:
         _check_several(targets, rig, detector, hints)
-    files = _check_paths(paths, rig)
+    count = None if rig is None else len(rig.cameras)
+    each = enumerate(check_items("paths", paths, count, "camera of the rig"))
+    files = [check_path(f"paths[{i}]", path) for i, path in each]
     shots = [vision.video_info(path) for path in files]
     if rig is None:
         rig = Rig(tuple(cameras.PerspectiveCamera(image_size=shot.size) for shot in shots))
@@ -170,21 +172,19 @@ def observe(
             )
     clocks = [vision.frame_clock(path) for path in files]
     clock = Clock.of_videos([shot.fps for shot in shots], clocks, t)
-    given = _check_lags(lags, clock, names)
+    starts = _check_lags(lags, clock, names)
     films = bar(progress, "track", iterable=list(zip(files, shots, strict=True)))
-    if hints is None:
-        hints = [None] * len(files)
-    elif not isinstance(hints, Sequence) or len(hints) != len(files):
-        raise ValueError(f"hints: must be one per video ({len(files)}) or None, got {shown(hints)}")
+    hints = [None] * len(files) if hints is None else hints
+    asked = check_items("hints", hints, len(files), "video")
     seen = [
         _track_one(path, shot.frames, detector, hint, targets)
-        for (path, shot), hint in zip(films, hints, strict=True)
+        for (path, shot), hint in zip(films, asked, strict=True)
     ]
     tracks = [np.hstack([track.pixels for track in found]) for found in seen]
     check_found(tracks, names, targets)
     doubts = [warning for found in seen for track in found for warning in track.warnings]
     conclude = _observed if targets == 1 else _several_observed
-    return conclude(tracks, rig, clock, given, names, doubts, progress)
+    return conclude(tracks, rig, clock, starts, names, doubts, progress)
 
 
 def observe_tracks(
@@ -231,9 +231,7 @@ def observe_tracks(
         raise ValueError(f"tracks: must have two frames or more, got {[*map(len, raw)]}")
     clock = Clock.of_tracks(t, raw)
     called = [f"tracks[{i}]" for i in range(len(raw))] if names is None else names
-    names = [str(name) for name in check_items("names", called)]
-    if len(names) != len(raw):
-        raise ValueError(f"names: must be one per track, got {len(names)} for {len(raw)}")
+    names = [str(name) for name in check_items("names", called, len(raw), "track")]
     for name, track, camera in zip(names, raw, rig.cameras, strict=True):
         seen = track[np.isfinite(track)]
         if seen.size and (np.abs(seen) <= 1).all():
@@ -383,19 +381,6 @@ def _check_lags(lags: Sequence[float] | None, clock: Clock, names: Sequence[str]
             f"({frames[0]} frames), got {given[i]:g} for {names[i]} ({frames[i]} frames)"
         )
     return given
-
-
-def _check_paths(paths: Sequence[str | Path], rig: Rig | None) -> list[Path]:
-    """One file name per camera."""
-    if isinstance(paths, str) or not isinstance(paths, Iterable):
-        raise ValueError(f"paths: must be a list of files, one per camera, got {shown(paths)}")
-    files = [check_path(f"paths[{i}]", path) for i, path in enumerate(paths)]
-    if rig is not None and len(files) != len(rig.cameras):
-        raise ValueError(
-            f"paths: there must be one video per camera of the rig ({len(rig.cameras)}), "
-            f"got {len(files)}"
-        )
-    return files
 
 
 def _check_several(
