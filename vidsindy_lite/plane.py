@@ -178,14 +178,12 @@ def discover_from_video(
     known = slice(3 if corners is None else 1) if pixels else slice(0)
     modes = np.stack([error * x, *_tilts(camera, seen.pixels, middle)])[known]
     with refusing("law", [seen.pixels], [name]):
-        law = _law(t, x, modes, degree, order, seed, progress)
-    swing = law.swing
-    doubts = law.warnings if swing is None else (*swing.circle.warnings, *swing.law.warnings)
+        law, circle = _law(t, x, modes, degree, order, seed, progress)
+    doubts = law.warnings if circle is None else (*circle.warnings, *law.warnings)
     found = PlaneDiscovery(
         tracks=(seen.pixels,), rig=rig, lags=Lags(np.zeros(1), np.ones(1), np.zeros(1), 0.0),
         t=t, x=_in_space(x), systematic=np.pad(modes, ((0, 0), (0, 0), (0, 1))),
-        warnings=(), discovery=law if swing is None else swing.law,
-        unit=unit, circle=None if swing is None else swing.circle,
+        warnings=(), discovery=law, unit=unit, circle=circle,
     )  # fmt: skip
     contradicted = _contradicted(found, up is not None or corners is not None, corners is None)
     return replace(found, warnings=(*seen.warnings, *doubts, *contradicted))
@@ -290,8 +288,10 @@ def _tilts(camera: PlaneCamera, pixels: Floats, middle: Floats) -> list[Floats]:
 def _law(
     t: Floats, x: Floats, modes: Floats, degree: int | None, order: int | str, seed: int,
     progress: bool | None,
-) -> Discovery:  # fmt: skip
+) -> tuple[Discovery, Round | None]:  # fmt: skip
     """The law of places: of nested ones the simplest that the data bear, or the one asked for.
+
+    Or that of an angle, and the circle on which it is.
 
     A plane that lies askew bends a path a little as other forces would: laws are told from each
     other without its modes, which are in the error bars of what flies and of what swings round.
@@ -300,15 +300,14 @@ def _law(
     if degree is None and order == "auto":
         flight = homogeneous(t[there], x[there], ("x", "y"), modes[:, there])
         if flight is not None:
-            return flight
+            return flight, None
         degree, order, axes = 1, 2, _axes(t[there], x[there])
     law = discover(t, x @ axes.T, degree, seed, progress, modes[:1] @ axes.T, order)
     if law.swing is not None:
-        circle = on_circle(x, law.swing.circle.axes[0], modes)
-        law = replace(law, swing=replace(law.swing, circle=circle))
+        return law.swing.law, on_circle(x, law.swing.circle.axes[0], modes)
     if len(axes) == 1:
         law = replace(law, orientation=np.pad(axes, ((0, 0), (0, 1))))
-    return law
+    return law, None
 
 
 def _axes(t: Floats, x: Floats) -> Floats:

@@ -119,13 +119,11 @@ def check_folder_is_free(folder: str | Path) -> Path:
     folder = check_path("out", folder)
     there = folder if folder.exists() else folder.absolute().parent
     whose = "folder" if there == folder else "folder around it"
-    if not there.is_dir():
-        raise ValueError(f"out: the {whose} must be one that exists, got '{folder}'")
     try:
-        with tempfile.TemporaryFile(dir=there):
-            pass
+        tempfile.TemporaryFile(dir=there).close()
     except OSError:
-        raise ValueError(f"out: the {whose} must be writable, got '{folder}'") from None
+        rule = "must be one that exists and can be written to"
+        raise ValueError(f"out: the {whose} {rule}, got '{folder}'") from None
     strange = [name for name in FILES if (folder / name).exists()]
     page, data = folder / PAGE, folder / DATA  # an interruption may have left the data alone
     is_earlier = _holds(page, *_TITLES) or not page.exists() and _holds(data, _BEGIN)
@@ -268,8 +266,11 @@ def summary(found: VideoDiscovery, paths: Videos, options: Options = None) -> di
     missed = found.residuals
     cameras = []
     names = _names(paths, len(found.rig.cameras))
+    rates = found.lags.rates / np.median(np.diff(found.t))
     for i, camera in enumerate(found.rig.cameras):
-        shot, seen = _shot(found, paths, i), np.isfinite(found.tracks[i]).all(axis=1)
+        seen = np.isfinite(found.tracks[i]).all(axis=1)
+        known = VideoInfo(len(found.tracks[i]), float(rates[i]), camera.image_size)
+        shot = known if paths is None else video_info(paths[i])
         length = np.linalg.norm(missed[i].reshape(-1, 2), axis=1)
         length = length[np.isfinite(length)]
         cameras.append({
@@ -306,14 +307,6 @@ def summary(found: VideoDiscovery, paths: Videos, options: Options = None) -> di
         "residuals": missed,
     }
     return {key: as_json(value, f"found[{key!r}]") for key, value in content.items()}
-
-
-def _shot(found: VideoDiscovery, paths: Videos, i: int) -> VideoInfo:
-    """What is known of a video, or of the track that there is in its place."""
-    if paths is not None:
-        return video_info(paths[i])
-    rate = found.lags.rates[i] / float(np.median(np.diff(found.t)))
-    return VideoInfo(len(found.tracks[i]), rate, found.rig.cameras[i].image_size)
 
 
 def _law(found: Discovery, frame: str) -> dict[str, object]:
