@@ -136,11 +136,7 @@ def check_folder_is_free(folder: str | Path) -> Path:
 
 
 def write_report(
-    found: VideoDiscovery,
-    paths: Videos,
-    folder: str | Path,
-    options: Options = None,
-    progress: bool | None = None,
+    found: VideoDiscovery, paths: Videos, folder: str | Path, options: Options = None
 ) -> Path:
     """Write the report on a law.
 
@@ -153,8 +149,6 @@ def write_report(
         Where; the files of an earlier report are replaced.
     options : mapping, optional
         How the law was asked for, to be told in the report.
-    progress : bool, optional
-        Whether a progress bar is shown; by default after two seconds, if a person watches.
 
     Returns
     -------
@@ -173,7 +167,11 @@ def write_report(
     content = summary(found, paths, options)
     files = _data(content, found.t, found.tracks)
     files |= {RIG: found.rig.text()} if len(found.rig.cameras) > 1 else {}
-    return _put(folder, files | {PAGE: _page(found, paths, content, progress)})
+    total = 2 + (paths is not None) + 2 * (len(found.rig.cameras) > 1)
+    figures = bar(None, "report", iterable=_figures(found, paths), total=total)
+    film = None if paths is None else base64.b64encode(law_over_videos(found, paths)).decode()
+    drawn = {"figures": figures, "film": film, "limit": DISAGREEMENT}
+    return _put(folder, files | {PAGE: page("report.html", found=found, **drawn, **content)})
 
 
 def write_refusal(
@@ -343,21 +341,7 @@ def _parts(whole: object, *names: str) -> dict[str, object]:
     return {name: getattr(whole, name, None) for name in names}
 
 
-# ---------------------------------------------------------------------------------------- the page
-
-
-def _page(
-    found: VideoDiscovery,
-    paths: Videos,
-    content: Mapping[str, object],
-    progress: bool | None = None,
-) -> str:
-    """The report as one HTML page."""
-    total = 2 + (paths is not None) + 2 * (len(found.rig.cameras) > 1)
-    figures = bar(progress, "report", iterable=_figures(found, paths), total=total)
-    film = None if paths is None else base64.b64encode(law_over_videos(found, paths)).decode()
-    drawn = {"figures": figures, "film": film, "limit": DISAGREEMENT}
-    return page("report.html", found=found, **drawn, **content)
+# ------------------------------------------------------------------------------------- its figures
 
 
 def _figures(found: VideoDiscovery, paths: Videos) -> Iterator[tuple[str, str]]:
