@@ -53,12 +53,9 @@ def _parser() -> argparse.ArgumentParser:
         )
         for kind in _RULES:
             one.register("type", kind.__name__, kind)
-        kinds: dict[str, list[str]] = {}
         for option, settings in command.pop("options").items():
-            goes_with = settings.pop("with", None)
-            dest = one.add_argument(option, **settings).dest
-            kinds |= {dest: goes_with} if goes_with else {}
-        one.set_defaults(work=COMMANDS[name], usual=one.get_default, kinds=kinds, **command)
+            one.add_argument(option, **settings)
+        one.set_defaults(work=COMMANDS[name], usual=one.get_default, **command)
     return parser
 
 
@@ -91,8 +88,6 @@ _RULES: dict[Any, str] = {
     size: "two integers like 1920x1080",
 }  # fmt: skip
 """What the values of options are made by, and have to be."""
-_KINDS = {"one": "one video alone", "several": "several videos", "tracks": "--tracks"}
-"""What a law is discovered from."""
 
 
 # ------------------------------------------------------ the commands, whose docstrings --help shows
@@ -142,15 +137,12 @@ def _discover(options: argparse.Namespace) -> int:
     if options.rig is None and len(options.videos) in (0, 2):
         raise ValueError("rig: must be given for tracks or two videos, got none")
     alone = options.rig is None and len(options.videos) == 1
-    kind = "tracks" if options.tracks else "one" if alone else "several"
-    asked = {}
-    for name, kinds in options.kinds.items():
-        value = getattr(options, name)
-        if kind in kinds:
-            asked[name] = value
-        elif value != options.usual(name):
-            rule = f"must be given with {' or '.join(_KINDS[one] for one in kinds)}"
-            raise ValueError(f"{name}: {rule}, got {value}")
+    kind = "--tracks" if options.tracks else "one video alone" if alone else "several videos"
+    asked = {name: getattr(options, name) for name in options.kinds[kind]}
+    for name in sum(options.kinds.values(), []):
+        if name not in asked and (value := getattr(options, name)) != options.usual(name):
+            fitting = " or ".join(one for one, names in options.kinds.items() if name in names)
+            raise ValueError(f"{name}: must be given with {fitting}, got {value}")
     rig, videos = Rig.load(options.rig) if options.rig else None, options.videos or None
     told = asked | {"frames in a unit of time": options.fps, "fps": None}
     if not alone:
@@ -191,9 +183,9 @@ def _found(options: argparse.Namespace, rig: Any, kind: str, asked: dict[str, An
 
     if options.order != "auto":
         asked["order"] = int(options.order)
-    if kind == "tracks":
+    if kind == "--tracks":
         return discover_from_tracks(options.tracks, rig, **asked)
-    if kind == "one":
+    if kind == "one video alone":
         if options.hint is not None:
             frame, *box = check_vector("hint", options.hint, 5)
             asked["hint"] = Hint(frame=int(frame), box=tuple(box))
