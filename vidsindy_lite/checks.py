@@ -59,7 +59,8 @@ def check_items(
             raise TypeError
         items = tuple(values)
     except TypeError:  # also of a scalar that calls itself iterable
-        raise ValueError(f"{name}: must be a list, got {shown(values)}") from None
+        each = of and f", one per {of}"
+        raise ValueError(f"{name}: must be a list{each}, got {shown(values)}") from None
     if count is not None and len(items) != count:
         raise ValueError(f"{name}: must be one per {of}, got {len(items)} for {count}")
     return items

@@ -72,6 +72,8 @@ def check_file(name: str, path: str | os.PathLike, what: str = "file") -> Path:
 def read_text(name: str, path: Path, kind: str, fallback: str | None = None) -> str:
     """A file of text in UTF-8, or in UTF-16 if its first bytes say so, or in the fallback.
 
+    That is an encoding in which all bytes are characters.
+
     Raises
     ------
     ValueError
@@ -84,14 +86,11 @@ def read_text(name: str, path: Path, kind: str, fallback: str | None = None) -> 
         )
     raw = path.read_bytes()
     encoding = next((known for mark, known in _MARKS.items() if raw.startswith(mark)), "utf-8")
-    text = None
-    for one in filter(None, (encoding, fallback)):
-        try:
-            text = raw.decode(one)
-            break
-        except UnicodeDecodeError:
-            continue
-    if text is None or any(mark < " " and not mark.isspace() for mark in text[:_HEAD]):
+    try:
+        text = raw.decode(encoding)
+    except UnicodeDecodeError:
+        text = raw.decode(fallback) if fallback else "\0"  # which no text holds
+    if any(mark < " " and not mark.isspace() for mark in text[:_HEAD]):
         raise ValueError(f"{name}: must be {kind} in UTF-8, got '{path.name}', which is none")
     digits = re.search(rf"\d{{{MOST_DIGITS},}}", text)
     if digits:

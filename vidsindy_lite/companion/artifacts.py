@@ -99,7 +99,7 @@ def save_figure(
     TypeError
         If something in `numbers` is none of the above.
     """
-    record = _record(figure_id, "figure", caption, "numbers", numbers, tolerance)
+    record = _record(figure_id, "figure", caption, numbers, tolerance)
     record["words"] = _words(figure)
     _write(record, _png(figure))
 
@@ -127,7 +127,7 @@ def save_animation(
     ValueError, TypeError
         As `save_figure` does.
     """
-    record = _record(animation_id, "animation", caption, "numbers", numbers, None)
+    record = _record(animation_id, "animation", caption, numbers)
     palette = Image.fromarray(np.concatenate(pictures)).quantize(256, PALETTE)
     images = (Image.fromarray(picture) for picture in pictures)
     first, *rest = (one.quantize(palette=palette, dither=Image.Dither.NONE) for one in images)
@@ -240,7 +240,7 @@ def save_table(
     for row in copies:
         if isinstance(row.get("seconds"), int | float):
             row["seconds"] = float(f"{row['seconds']:.2g}")
-    record = _record(table_id, "table", caption, "rows", copies, tolerance)
+    record = _record(table_id, "table", caption, copies, tolerance)
     _write(record)
     return Markdown(table_text(record))
 
@@ -267,9 +267,8 @@ def _record(
     artifact_id: str,
     kind: str,
     caption: str,
-    holds: str,
     content: Mapping | list,
-    tolerance: float | Mapping[str, float] | None,
+    tolerance: float | Mapping[str, float] | None = None,
 ) -> dict:
     """A record, checked."""
     if not re.fullmatch(r"[A-Za-z0-9_-]+", artifact_id) or artifact_id == Path(INDEX).stem:
@@ -280,7 +279,8 @@ def _record(
     caption = " ".join(caption.split())
     if not caption:
         raise ValueError(f"caption: {kind} {artifact_id!r} needs a sentence, got an empty one")
-    known = {name for row in (content if isinstance(content, list) else [content]) for name in row}
+    holds, rows = ("rows", content) if isinstance(content, list) else ("numbers", [content])
+    known = {name for row in rows for name in row}
     if strange := set(tolerance if isinstance(tolerance, Mapping) else ()) - known:
         raise ValueError(
             f"tolerance: must name what is in {kind} {artifact_id!r} ({', '.join(sorted(known))}), "
