@@ -345,9 +345,6 @@ def files_of(record: dict) -> list[str]:
 
 def write_index(folder: Path) -> None:
     """Write the folder's index page (README.md, which code hosts show) from the records."""
-    records = read_records(folder)
-    made: dict[str, list[dict]] = {}
-    for record in sorted(records.values(), key=lambda record: record["notebook"]):
-        made.setdefault(record["notebook"], []).append(record)
-    tables = {name: table_text(record) for name, record in records.items() if "rows" in record}
-    write_file(folder / INDEX, page("index.md", made=made, tables=tables).encode())
+    records = list(read_records(folder).values())
+    text = page("index.md", records=records, table_text=table_text)
+    write_file(folder / INDEX, text.encode())
