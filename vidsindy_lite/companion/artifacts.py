@@ -15,7 +15,6 @@ VIDSINDY_NOTEBOOK. Without it, a cell that somebody runs by hand writes to
 build/interactive/figures: only the runner writes the committed ones.
 """
 
-import base64
 import io
 import json
 import os
@@ -174,8 +173,8 @@ def save_slider(
         plt.close(figure)
     (width, height), strip = frames[0].size, io.BytesIO()
     Image.fromarray(np.concatenate([np.asarray(frame) for frame in frames])).save(strip, "PNG")
-    coded = base64.b64encode(with_palette(strip.getvalue())).decode()
-    shown = {"labels": list(figures), "caption": caption, "strip": coded}
+    packed = with_palette(strip.getvalue())
+    shown = {"labels": list(figures), "caption": caption, "strip": packed}
     return HTML(page("slider.html", width=width, height=height, **shown))
 
 

@@ -101,15 +101,8 @@ def write_differences(
     """
     output = check_page("output", output, "compare.html")
     found = differences(committed, regenerated)
-    pictures = {
-        name: {
-            side: base64.b64encode(picture.read_bytes()).decode()
-            for side, folder in (("committed", committed), ("regenerated", regenerated))
-            if (picture := Path(folder) / f"{name}.png").exists()
-        }
-        for name in found
-    }
-    write_file(output, page("compare.html", found=found, pictures=pictures).encode())
+    folders = {"committed": Path(committed), "regenerated": Path(regenerated)}
+    write_file(output, page("compare.html", found=found, folders=folders).encode())
     return found
 
 

@@ -69,6 +69,7 @@ _PAGES = jinja2.Environment(
     undefined=jinja2.StrictUndefined,
     keep_trailing_newline=True,
 )
+_PAGES.filters |= {"base64": lambda data: base64.b64encode(data).decode()}
 _PAGES.globals |= {"data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS}
 
 
@@ -169,7 +170,7 @@ def write_report(
     files |= {RIG: found.rig.text()} if len(found.rig.cameras) > 1 else {}
     total = 2 + (paths is not None) + 2 * (len(found.rig.cameras) > 1)
     figures = bar(None, "report", iterable=_figures(found, paths), total=total)
-    film = None if paths is None else base64.b64encode(law_over_videos(found, paths)).decode()
+    film = None if paths is None else law_over_videos(found, paths)
     drawn = {"figures": figures, "film": film, "limit": DISAGREEMENT}
     return _put(folder, files | {PAGE: page("report.html", found=found, **drawn, **content)})
 
@@ -344,8 +345,8 @@ def _parts(whole: object, *names: str) -> dict[str, object]:
 # ------------------------------------------------------------------------------------- its figures
 
 
-def _figures(found: VideoDiscovery, paths: Videos) -> Iterator[tuple[str, str]]:
-    """The figures one after the other, each a PNG in base64, by their names in the template."""
+def _figures(found: VideoDiscovery, paths: Videos) -> Iterator[tuple[str, bytes]]:
+    """The figures one after the other, each a PNG, by their names in the template."""
     # Several targets are drawn as one that begins again.
     t = stacked(np.tile(found.t[:, None], found.targets), 1)[:, 0]
     x = stacked(found.x, 3)
@@ -388,8 +389,8 @@ def _short(name: str, i: int) -> str:
     return fitting.replace("$", r"\$")
 
 
-def _picture(plot: Callable[..., Figure], *shown: object) -> str:
-    """What a function plots, as a PNG in base64."""
+def _picture(plot: Callable[..., Figure], *shown: object) -> bytes:
+    """What a function plots, as a PNG."""
     # The first use of pyplot switches the figures of a notebook on, the end of a style whatever was
     # switched on meanwhile off again: so this comes first.
     plt.draw_if_interactive()
@@ -398,7 +399,7 @@ def _picture(plot: Callable[..., Figure], *shown: object) -> str:
         figure = plot(*shown)
         figure.savefig(image, format="png", dpi=110)
         plt.close(figure)
-    return base64.b64encode(image.getvalue()).decode()
+    return image.getvalue()
 
 
 # -------------------------------------------------------------------------- the law over the videos
@@ -509,6 +510,5 @@ def _video(path: Path) -> dict[str, object]:
     for number, image in zip(numbers, pick_frames(path, numbers), strict=False):
         small = cv2.resize(image, None, fx=shrunk, fy=shrunk, interpolation=cv2.INTER_AREA)
         _, packed = cv2.imencode(".jpg", small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-        frames.append({"number": number, "image": base64.b64encode(packed.tobytes()).decode()})
-    width, height = info.size
-    return {"name": path.name, "width": width, "height": height, "frames": frames}
+        frames.append({"number": number, "image": packed.tobytes()})
+    return {"name": path.name, "size": info.size, "frames": frames}
