@@ -221,10 +221,8 @@ def _is_running(process: int) -> bool:
     """Whether a process of this number is there; where that cannot be told, it is."""
     try:
         os.kill(process, 0) if os.name == "posix" else None
-    except ProcessLookupError:
-        return False
-    except (PermissionError, OverflowError):
-        return True
+    except (ProcessLookupError, PermissionError, OverflowError) as error:
+        return not isinstance(error, ProcessLookupError)
     return True
 
 
