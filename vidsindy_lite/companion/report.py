@@ -198,22 +198,17 @@ def write_refusal(
         Of the page.
     """
     folder = check_folder_is_free(folder).absolute()
-    names = _names(paths, len(refused.tracks))
+    seen = [np.isfinite(track).all(axis=1) for track in refused.tracks]
     content: dict[str, object] = {
         "format": FORMAT, "status": "refused", "step": refused.step, "error": str(refused),
-        "videos": names, "options": dict(options or {}),
+        "videos": _names(paths, len(seen)), "options": dict(options or {}),
         "tracks": [as_json(track, "tracks") for track in refused.tracks],
-        "share_of_frames_seen": [float(np.isfinite(t).all(axis=1).mean()) for t in refused.tracks],
+        "share_of_frames_seen": [float(one.mean()) for one in seen],
     }  # fmt: skip
     # In the middle of what is seen of the target in each view.
-    seen = [np.flatnonzero(np.isfinite(track).all(axis=1)) for track in refused.tracks]
-    shown = [int(k[len(k) // 2]) if len(k) else 0 for k in seen]
-    sizes = [camera.image_size for camera in rig.cameras] if rig else [(1, 1)] * len(names)
-    images = [
-        np.full((height, width, 3), 255, np.uint8) if paths is None else read_frame(paths[i], k)
-        for i, ((width, height), k) in enumerate(zip(sizes, shown, strict=True))
-    ]
-    look = _picture(_look, images, names, shown, refused.tracks, shown)
+    shown = [int(np.flatnonzero(one)[one.sum() // 2]) if one.any() else 0 for one in seen]
+    sizes = [camera.image_size for camera in rig.cameras] if rig else [(1, 1)] * len(seen)
+    look = _picture(_look, paths, sizes, shown, refused.tracks, shown)
     frames = np.arange(max(len(track) for track in refused.tracks), dtype=float)
     files = _data(content, frames, refused.tracks, "frame")
     return _put(folder, files | {PAGE: page("refusal.html", look=look, **content)})
@@ -358,9 +353,8 @@ def _figures(found: VideoDiscovery, paths: Videos) -> Iterator[tuple[str, bytes]
     if seen.any() and paths is not None:
         instant = int(seen.argmax())
         shown = [found.lags.frame_at(i, instant) for i in range(len(paths))]
-        images = [read_frame(path, frame) for path, frame in zip(paths, shown, strict=True)]
-        names = _names(paths, len(paths))
-        yield "look", _picture(_look, images, names, shown, found.tracks, instant)
+        sizes = [camera.image_size for camera in found.rig.cameras]
+        yield "look", _picture(_look, paths, sizes, shown, found.tracks, instant)
     if len(found.rig.cameras) > 1:
         yield "rig", _picture(plot_rig, found.rig, x)
         missed = [stacked(one, 2) for one in found.residuals]
@@ -369,14 +363,19 @@ def _figures(found: VideoDiscovery, paths: Videos) -> Iterator[tuple[str, bytes]
 
 
 def _look(
-    images: Sequence[Image],
-    names: Sequence[str],
+    paths: Videos,
+    sizes: Sequence[tuple[int, int]],
     frames: Sequence[int],
     tracks: Sequence[Floats],
     index: int | Sequence[int],
 ) -> Figure:
-    """A frame of each view, with its whole track over it."""
-    titles = [f"{_short(name, i)}, frame {frames[i]}" for i, name in enumerate(names)]
+    """A frame of each view, white where there is no video, with its whole track over it."""
+    names = enumerate(_names(paths, len(tracks)))
+    titles = [f"{_short(name, i)}, frame {frames[i]}" for i, name in names]
+    images = [
+        np.full((height, width, 3), 255, np.uint8) if paths is None else read_frame(paths[i], k)
+        for i, ((width, height), k) in enumerate(zip(sizes, frames, strict=True))
+    ]
     return plot_frames(images, titles, tracks, index)
 
 
