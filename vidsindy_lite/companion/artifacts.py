@@ -296,7 +296,7 @@ def _record(
 
 
 def _write(record: dict, *picture: bytes) -> None:
-    """Write a record, a line per entry and per row, and its picture."""
+    """Write a picture, then its record, a line per entry and per row."""
 
     def entry(value: object) -> str:
         if isinstance(value, dict) and value:
@@ -308,7 +308,7 @@ def _write(record: dict, *picture: bytes) -> None:
 
     lines = (f" {json.dumps(key)}: {entry(value)}" for key, value in record.items())
     text = "{\n" + ",\n".join(lines) + "\n}\n"
-    contents = zip(files_of(record), (text.encode(), *picture), strict=True)
+    contents = zip(reversed(files_of(record)), (*picture, text.encode()), strict=True)
     write_files({figures_folder() / name: content for name, content in contents})
 
 

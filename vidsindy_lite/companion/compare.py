@@ -140,7 +140,8 @@ def replace(committed: Path, regenerated: Path, names: Iterable[str]) -> None:
     old, new = read_records(committed), read_records(regenerated)
     for name in names:
         files = files_of(new[name]) if name in new else []
-        write_files({committed / file: (regenerated / file).read_bytes() for file in files})
+        # The record last.
+        write_files({committed / f: (regenerated / f).read_bytes() for f in reversed(files)})
         for file in set(files_of(old[name]) if name in old else []) - set(files):
             (committed / file).unlink(missing_ok=True)
 
