@@ -46,7 +46,7 @@ def _parser() -> argparse.ArgumentParser:
         text, *below = re.split(r"\n\n(?=examples:|exit status:)", shown, maxsplit=1)
         one = commands.add_parser(
             name,
-            help=command["help"],
+            help=command.pop("help"),
             description=text,
             epilog=below[0] if below else None,
             formatter_class=argparse.RawDescriptionHelpFormatter,

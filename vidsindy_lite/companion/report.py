@@ -74,7 +74,9 @@ _PAGES.globals |= {"data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS}
 
 
 Videos: TypeAlias = Sequence[str | Path] | None
+"""One per camera; None if there are tracks alone."""
 Options: TypeAlias = Mapping[str, object] | None
+"""How a law was asked for."""
 
 
 def page(template: str, **values: object) -> str:
