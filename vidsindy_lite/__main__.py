@@ -83,11 +83,11 @@ def size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
+# What the values of options are made by, and have to be.
 _RULES: dict[Any, str] = {
     int: "an integer", float: "a number", numbers: "numbers with commas between them",
     size: "two integers like 1920x1080",
 }  # fmt: skip
-"""What the values of options are made by, and have to be."""
 
 
 # ------------------------------------------------------ the commands, whose docstrings --help shows

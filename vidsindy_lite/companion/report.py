@@ -73,10 +73,8 @@ _PAGES.filters |= {"base64": lambda data: base64.b64encode(data).decode()}
 _PAGES.globals |= {"data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS}
 
 
-Videos: TypeAlias = Sequence[str | Path] | None
-"""One per camera; None if there are tracks alone."""
-Options: TypeAlias = Mapping[str, object] | None
-"""How a law was asked for."""
+Videos: TypeAlias = Sequence[str | Path] | None  # one per camera; None if there are tracks alone
+Options: TypeAlias = Mapping[str, object] | None  # how a law was asked for
 
 
 def page(template: str, **values: object) -> str:
