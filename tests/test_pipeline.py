@@ -75,10 +75,10 @@ def untracked(monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "options", "message"),
     [
-        ({"paths": ["a.mkv", "b.mkv"]}, {}, r"paths: there must be one video .*\(3\), got 2"),
+        ({"paths": ["a.mkv", "b.mkv"]}, {}, "paths: must be one per camera .*, got 2 for 3"),
         ({"t": np.arange(10)}, {}, r"t: must have shape \(200,\), one per frame of the .* \(10,\)"),
         ({"rig": "rig.toml"}, {}, "rig: must be of type Rig, got 'rig.toml'"),
-        ({"paths": "a.mkv"}, {}, "paths: must be a list of files, .* got 'a.mkv'"),
+        ({"paths": "a.mkv"}, {}, "paths: must be a list, one per camera .* got 'a.mkv'"),
         ({"paths": ["a.mkv", None, "c.mkv"]}, {}, r"paths\[1\]: must be the name of a file"),
         ({"paths": ["\udcff.mkv"] * 3}, {}, r"paths\[0\]: must be made of characters, got"),
         ({}, {"degree": 0}, "degree: must be an integer of at least 1, got 0"),

@@ -207,7 +207,7 @@ TROUBLES = {
     "got x and y of Tracker or Kinovea with another origin": lambda studio: track_file(
         studio, "mass_A\nt,x,y\n0,-1.5,0.5\n1,-1.4,0.3\n"
     ),
-    "there must be one video per camera": lambda studio: studio.says(studio.paths[:2]),
+    "must be one per camera of the rig": lambda studio: studio.says(studio.paths[:2]),
     "at least one camera must be calibrated": uncalibrated,
     "the positions of two cameras with independent normals must be given": without_positions,
     "the target's motion must determine": nothing_in_common,

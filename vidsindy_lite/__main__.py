@@ -6,16 +6,18 @@ import re
 import signal
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+import tomllib
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 from . import __version__
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
-    options = argparse.Namespace(typed={}, kept=_KEPT)  # until it is known which command it is
+    # As they are written in one step, at the end; and until it is known which command it is.
+    options = argparse.Namespace(typed={}, kept="files are as they were")
     try:
         _parser().parse_args(arguments, options)
         return options.work(options)
@@ -30,6 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
+    """What ``__main__.toml`` describes; --help of a command shows the docstring of its function."""
     parser = _Parser(
         prog="python -m vidsindy_lite",
         description="From three videos of a moving target to its governing equations.",
@@ -37,21 +40,54 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"vidsindy_lite {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for name, command in COMMANDS.items():
-        told = inspect.getdoc(command.work) or ""
-        text, *below = re.split(r"\n\n(?=examples:|exit status:)", told, maxsplit=1)
+    described = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+    for name, command in described.items():
+        shown = inspect.getdoc(COMMANDS[name]) or ""
+        text, *below = re.split(r"\n\n(?=examples:|exit status:)", shown, maxsplit=1)
         one = commands.add_parser(
             name,
-            help=command.help,
+            help=command.pop("help"),
             description=text,
             epilog=below[0] if below else None,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        for option, settings in command.options.items():
+        for kind in _RULES:
+            one.register("type", kind.__name__, kind)
+        for option, settings in command.pop("options").items():
             one.add_argument(option, **settings)
-        usual = one.get_default
-        one.set_defaults(work=command.work, typed=command.typed, kept=command.kept, usual=usual)
+        one.set_defaults(work=COMMANDS[name], usual=one.get_default, **command)
     return parser
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that refuses as the package does: argument, rule and value in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        told = re.fullmatch(r"(.*)invalid choice: (.*) \(choose from (.*)\)", message)
+        if told:
+            known = told[3].replace("'", "")
+            message = f"{told[1]}must be one of {known}, got {told[2]}"
+        for kind, rule in _RULES.items():
+            message = message.replace(f"invalid {kind.__name__!r} value: ", f"must be {rule}, got ")
+        raise ValueError(message.removeprefix("argument ").removeprefix("--"))
+
+
+def numbers(text: str) -> list[float]:
+    """Numbers with commas between them."""
+    return [float(part) for part in text.split(",")]
+
+
+def size(text: str) -> tuple[int, int]:
+    """Width and height in pixels."""
+    width, height = text.split("x")
+    return int(width), int(height)
+
+
+# What the values of options are made by, and have to be.
+_RULES: dict[Any, str] = {
+    int: "an integer", float: "a number", numbers: "numbers with commas between them",
+    size: "two integers like 1920x1080",
+}  # fmt: skip
 
 
 # ------------------------------------------------------ the commands, whose docstrings --help shows
@@ -92,42 +128,33 @@ def _discover(options: argparse.Namespace) -> int:
     from .companion.report import PAGE, check_folder_is_free, write_refusal, write_report
     from .dynamics import Library, check_library
     from .pipeline import Refused, Stopped
-    from .vision import check_detector
 
     if options.library is not None:
         options.library = Library.parse(options.library)
     if bool(options.videos) == bool(options.tracks):
         raise ValueError("videos: give either one video per camera, or --tracks")
-    if options.individual is not None and not options.tracks:
-        raise ValueError(f"individual: must be given with --tracks, got {options.individual!r}")
-    if options.tracks and options.targets != 1:
-        raise ValueError(f"targets: must be 1 with --tracks, got {options.targets}")
-    check_detector(options.detector)
     check_folder_is_free(options.out)
-    alone = options.rig is None and len(options.videos) == 1
     if options.rig is None and len(options.videos) in (0, 2):
         raise ValueError("rig: must be given for tracks or two videos, got none")
-    for name in _OF_A_RIG if alone else _OF_ONE_VIDEO:
-        if (value := getattr(options, name)) != options.usual(name):
-            rule = f"must be given with {'several videos' if alone else 'one video alone'}"
-            raise ValueError(f"{name}: {rule}, got {value}")
+    alone = options.rig is None and len(options.videos) == 1
+    kind = "--tracks" if options.tracks else "one video alone" if alone else "several videos"
+    asked = {name: getattr(options, name) for name in options.kinds[kind]}
+    for name in sum(options.kinds.values(), []):
+        if name not in asked and (value := getattr(options, name)) != options.usual(name):
+            fitting = " or ".join(one for one, names in options.kinds.items() if name in names)
+            raise ValueError(f"{name}: must be given with {fitting}, got {value}")
     rig, videos = Rig.load(options.rig) if options.rig else None, options.videos or None
-    told = {"seed": options.seed, "order": options.order}
-    if alone:
-        told |= {name: getattr(options, name) for name in ("degree", *_OF_ONE_VIDEO)}
-    else:
+    told = asked | {"frames in a unit of time": options.fps, "fps": None}
+    if not alone:
         told |= {
             "rig file": options.rig or "none",
-            "library": str(check_library(options.degree, options.library)),
-            "origin": options.origin, "orientation": options.orientation,
-            "lags": "learned" if options.lag is None else options.lag,
-            "targets": None if options.targets == 1 else options.targets,
+            "library": str(check_library(options.degree, options.library)), "degree": None,
+            "lags": "learned" if options.lags is None else options.lags,
+            "tracks": ", ".join(options.tracks or ()) or None,
         }  # fmt: skip
-    told |= {"detector": options.detector} if videos else {"tracks": ", ".join(options.tracks)}
-    told["frames in a unit of time"] = options.fps
     told = {name: value for name, value in told.items() if value is not None}
     try:
-        found = _found(options, rig, alone)
+        found = _found(options, rig, kind, asked)
     except (Refused, Stopped) as refused:
         if isinstance(refused, Stopped) and not videos:  # its tracks are there already
             raise KeyboardInterrupt from None
@@ -147,34 +174,27 @@ def _discover(options: argparse.Namespace) -> int:
     return 0 if found.status == "ok" else 1
 
 
-def _found(options: argparse.Namespace, rig: Any, alone: bool) -> Any:
+def _found(options: argparse.Namespace, rig: Any, kind: str, asked: dict[str, Any]) -> Any:
     """The law that videos or tracks obey, or a motion in a plane in the film of one camera."""
     from .checks import check_positive, check_vector
     from .pipeline import discover_from_tracks, discover_from_videos
     from .plane import discover_from_video
     from .vision import Hint, frame_clock, load_hints
 
-    def given(*names: str) -> dict[str, Any]:
-        return {name: getattr(options, name) for name in names}
-
-    order = "auto" if options.order == "auto" else int(options.order)
-    shared = given("degree", "seed") | {"order": order}
-    if alone:
-        shared |= given("fps", "detector", *_OF_ONE_VIDEO)
+    if options.order != "auto":
+        asked["order"] = int(options.order)
+    if kind == "--tracks":
+        return discover_from_tracks(options.tracks, rig, **asked)
+    if kind == "one video alone":
         if options.hint is not None:
             frame, *box = check_vector("hint", options.hint, 5)
-            shared["hint"] = Hint(frame=int(frame), box=tuple(box))
-        return discover_from_video(options.videos[0], **shared)
-    shared |= given("library", "origin", "orientation") | {"lags": options.lag}
-    if options.tracks:
-        return discover_from_tracks(options.tracks, rig, **shared, **given("individual", "fps"))
-    t = None
-    if options.fps is not None:
-        t = frame_clock(options.videos[0]) / check_positive("fps", options.fps)
+            asked["hint"] = Hint(frame=int(frame), box=tuple(box))
+        return discover_from_video(options.videos[0], **asked)
+    fps, t = asked.pop("fps"), None
+    if fps is not None:
+        t = frame_clock(options.videos[0]) / check_positive("fps", fps)
     hints = load_hints(options.rig) if options.rig else None
-    return discover_from_videos(
-        options.videos, rig, t, hints=hints, **shared, **given("detector", "targets")
-    )
+    return discover_from_videos(options.videos, rig, t, hints=hints, **asked)
 
 
 def _pick(options: argparse.Namespace) -> int:
@@ -312,196 +332,9 @@ def _compare(options: argparse.Namespace) -> int:
     return 1 if found else 0
 
 
-# ------------------------------------------------------------------------------------ their options
-
-
-class _Parser(argparse.ArgumentParser):
-    """A parser that refuses as the package does: argument, rule and value in one line."""
-
-    def error(self, message: str) -> NoReturn:
-        told = re.fullmatch(r"(.*)invalid choice: (.*) \(choose from (.*)\)", message)
-        if told:
-            known = told[3].replace("'", "")
-            message = f"{told[1]}must be one of {known}, got {told[2]}"
-        for kind, rule in _RULES.items():
-            message = message.replace(f"invalid {kind} value: ", f"must be {rule}, got ")
-        raise ValueError(message.removeprefix("argument ").removeprefix("--"))
-
-
-def numbers(text: str) -> list[float]:
-    """Numbers with commas between them."""
-    return [float(part) for part in text.split(",")]
-
-
-def size(text: str) -> tuple[int, int]:
-    """Width and height in pixels."""
-    width, height = text.split("x")
-    return int(width), int(height)
-
-
-_RULES = {
-    "int": "an integer", "float": "a number", "numbers": "numbers with commas between them",
-    "size": "two integers like 1920x1080",
-}  # fmt: skip
-
-
-def _choice(default: str, known: Sequence[str], what: str) -> dict[str, Any]:
-    """An option that has one of a few values."""
-    return {"default": default, "choices": known, "help": what}
-
-
-def _count(default: int | None, what: str) -> dict[str, Any]:
-    """An option that is an integer."""
-    return {"default": default, "type": int, "help": what}
-
-
-def _words(metavar: str, what: str, **more: object) -> dict[str, Any]:
-    """An argument or an option that is text, or is made of it."""
-    return {"metavar": metavar, "help": what, **more}
-
-
-_OF_ONE_VIDEO = ("length", "length_error", "up", "corners", "hint")
-_OF_A_RIG = ("library", "lag", "targets", "origin", "orientation")
-_KEPT = "files are as they were"  # as they are written in one step, at the end
-
-
-class _Command(NamedTuple):
-    """What a command does, a line on it, and what `add_argument` takes for each of its options.
-
-    What messages call by its name in the package, ``typed`` calls as the user does; ``kept`` says
-    what there is after an interruption.
-    """
-
-    work: Callable[[argparse.Namespace], int]
-    help: str
-    options: dict[str, dict[str, Any]]
-    typed: dict[str, str] = {}
-    kept: str = _KEPT
-
-
 COMMANDS = {
-    "discover": _Command(_discover, "from your own videos and a rig file to a report on the law", {
-        "videos": _words("VIDEO", "one per camera of the rig", nargs="*"),
-        "--tracks": _words(
-            "FILE", "text files of tracks, one per camera of the rig or one of all, in place of "
-            "videos", nargs="+"
-        ),
-        "--individual": _words(
-            "NAME", "which of several targets of these files, by its name there"
-        ),
-        "--rig": _words(
-            "FILE", "where the cameras stand; without it, three or more are learned from the "
-            "videos alone, or one video is of a motion in a plane"
-        ),
-        "--length": _words(
-            "U1,V1,U2,V2,METRES", "of one video: two marks in its first frame, pixels, and how far "
-            "they are apart in the plane of the motion", type=numbers
-        ),
-        "--length-error": _words(
-            "SHARE", "standard error of that length, as a share of it (default: 0.01)",
-            type=float, default=0.01
-        ),
-        "--up": _words(
-            "DU,DV", "of one video: the vertical in the picture, a direction or two marks, the "
-            "lower one first (default: 0,-1)", type=numbers
-        ),
-        "--corners": _words(
-            "U1,V1,...,WIDTH,HEIGHT", "of one video seen askew, in place of --length: the corners "
-            "of a rectangle in that plane, from its lower left to its lower right and round, and "
-            "its sides in metres", type=numbers
-        ),
-        "--hint": _words(
-            "FRAME,U,V,WIDTH,HEIGHT", "of one video: a frame and a box around the target in it",
-            type=numbers
-        ),
-        "--out": _words("DIR", "folder of the report (default: report)", default="report"),
-        "--lag": _words(
-            "0,L2,L3", "of several videos: how many frames of the first each starts later; "
-            "learned by default (a first number below zero needs the form --lag=-7,0,0)",
-            type=numbers
-        ),
-        "--fps": _words(
-            "RATE", "frames of each video in one unit of time of the equations (default: as the "
-            "files say, which makes it a second of video)", type=float
-        ),
-        "--degree": _count(None, "highest degree of the polynomials (default: 3)"),
-        "--library": _words(
-            "TERMS", "of several videos, in place of --degree: polynomial(N), fourier(N) with "
-            "the sines and cosines of the coordinates, rational(N) with denominators, or a sum "
-            "such as 'polynomial(1) + fourier(1)'; then what is known, as in "
-            "'polynomial(2); x: y = 10, z = 0' (?: to be found; ...: all others)"
-        ),
-        "--order": _choice(
-            "auto", ("1", "2", "auto"),
-            "1 for x' = f(x), 2 for laws of motion, x'' = f(x, x'), auto (default) for the one to "
-            "be trusted"
-        ),
-        "--origin": _choice(
-            "learn", ("learn", "data"),
-            "whether the law's own origin is sought (default) or is that of the data"
-        ),
-        "--orientation": _choice(
-            "data", ("data", "learn"),
-            "whether the axes are those of the rig (default), or turned to where the law has "
-            "fewest terms: for rigs that nobody has measured"
-        ),
-        "--detector": _words(
-            "NAME", "how to find the target: auto, background, learned, or the path of a YOLO-v8 "
-            "ONNX file (default: auto)", default="auto"
-        ),
-        "--targets": _count(
-            1, "of several videos: how many targets to find one law for (default: 1), which "
-            "are told from each other by geometry"
-        ),
-        "--seed": _count(0, "of the search (default: 0)"),
-    }, {"path": "videos", "paths": "videos", "lags": "lag"}),
-    "pick": _Command(_pick, "a page on which you show the target in your videos", {
-        "videos": _words("VIDEO", "a file, a folder of images, or a pattern", nargs="+"),
-        "--out": _words("FILE", "the page (default: pick.html)", default="pick.html"),
-    }, {"path": "videos", "paths": "videos"}),
-    "rig-template": _Command(_rig_template, "print a rig file to fill in", {
-        "--cameras": _count(3, "how many (default: 3)"),
-        "--model": _choice(
-            "perspective", ("perspective", "orthographic"),
-            "perspective (default), or orthographic for far cameras with long lenses"
-        ),
-        "--size": _words(
-            "WxH", "of the videos in pixels (default: 1920x1080)", type=size,
-            default=(1920, 1080)
-        ),
-        "--output": _words("FILE", "write it there, in UTF-8 (default: print it)"),
-    }, {"image_size": "size"}),
-    "rig-import": _Command(_rig_import, "a rig file from the calibration of another tool", {
-        "files": _words("FILE", "calibrations, in the order of the videos", nargs="+"),
-        "--size": _words("WxH", "of the videos in pixels, if the files do not say", type=size),
-        "--output": _words("FILE", "write it there, in UTF-8 (default: print it)"),
-    }, {"image_size": "size", "paths": "files"}),
-    "run": _Command(_run, "execute the notebooks, regenerate figures and tables", {
-        "notebooks": _words("NOTEBOOK", "number, name or path (default: all)", nargs="*"),
-        "--profile": _choice("full", ("full", "quick"), "size (default: full)"),
-        "--force": {
-            "action": "store_true",
-            "help": "execute also what has been executed here with the same code",
-        },
-    }, kept="notebooks that have ended are kept, and results in build/cache: start it again"),
-    "demo": _Command(_demo, "from three videos to the first equation, in a minute", {
-        "--system": _words("NAME", "of the paper's seven (default: Lorenz)", default="Lorenz"),
-        "--frames": _count(500, "per camera (default: 500)"),
-        "--seed": _count(0, "of scenes and noise (default: 0)"),
-    }),
-    "train-detector": _Command(_train, "train the learned detector from scratch", {
-        "--seed": _count(0, "of weights and frames (default: 0)"),
-        "--steps": _count(None, "batches of 16 frames (default: as shipped)"),
-        "--output": _words("FILE", "weights (default: those of the package)"),
-    }),
-    "compare": _Command(_compare, "two folders of figures, by their numbers", {
-        "committed": _words("COMMITTED", "a folder like figures/"),
-        "regenerated": _words("REGENERATED", "the same from another run"),
-        "--output": _words(
-            "FILE", "the page (default: differences.html); an earlier one is replaced",
-            default="differences.html"
-        ),
-    }),
+    "discover": _discover, "pick": _pick, "rig-template": _rig_template, "rig-import": _rig_import,
+    "run": _run, "demo": _demo, "train-detector": _train, "compare": _compare,
 }  # fmt: skip
 
 

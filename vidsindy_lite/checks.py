@@ -50,12 +50,20 @@ def check_instance(name: str, value: object, kind: type) -> None:
         raise ValueError(f"{name}: must be of type {kind.__name__}, got {shown(value)}")
 
 
-def check_items(name: str, values: Iterable[T]) -> tuple[T, ...]:
-    """The items of a list or the like."""
+def check_items(
+    name: str, values: Iterable[T], count: int | None = None, of: str = ""
+) -> tuple[T, ...]:
+    """The items of a list or the like; one for each of so many things, if these are given."""
     try:
-        return tuple(values)
+        if of and isinstance(values, str):
+            raise TypeError
+        items = tuple(values)
     except TypeError:  # also of a scalar that calls itself iterable
-        raise ValueError(f"{name}: must be a list, got {shown(values)}") from None
+        each = of and f", one per {of}"
+        raise ValueError(f"{name}: must be a list{each}, got {shown(values)}") from None
+    if count is not None and len(items) != count:
+        raise ValueError(f"{name}: must be one per {of}, got {len(items)} for {count}")
+    return items
 
 
 def check_path(name: str, value: str | os.PathLike) -> Path:

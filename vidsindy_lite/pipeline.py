@@ -10,6 +10,7 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import chain, repeat
 from pathlib import Path
 from typing import Any, cast
 
@@ -154,7 +155,9 @@ def observe(
     check_integer("targets", targets, least=1)
     if targets > 1:
         _check_several(targets, rig, detector, hints)
-    files = _check_paths(paths, rig)
+    count = None if rig is None else len(rig.cameras)
+    each = enumerate(check_items("paths", paths, count, "camera of the rig"))
+    files = [check_path(f"paths[{i}]", path) for i, path in each]
     shots = [vision.video_info(path) for path in files]
     if rig is None:
         rig = Rig(tuple(cameras.PerspectiveCamera(image_size=shot.size) for shot in shots))
@@ -169,21 +172,19 @@ def observe(
             )
     clocks = [vision.frame_clock(path) for path in files]
     clock = Clock.of_videos([shot.fps for shot in shots], clocks, t)
-    given = _check_lags(lags, clock, names)
+    starts = _check_lags(lags, clock, names)
     films = bar(progress, "track", iterable=list(zip(files, shots, strict=True)))
-    if hints is None:
-        hints = [None] * len(files)
-    elif not isinstance(hints, Sequence) or len(hints) != len(files):
-        raise ValueError(f"hints: must be one per video ({len(files)}) or None, got {shown(hints)}")
+    hints = [None] * len(files) if hints is None else hints
+    asked = check_items("hints", hints, len(files), "video")
     seen = [
         _track_one(path, shot.frames, detector, hint, targets)
-        for (path, shot), hint in zip(films, hints, strict=True)
+        for (path, shot), hint in zip(films, asked, strict=True)
     ]
     tracks = [np.hstack([track.pixels for track in found]) for found in seen]
     check_found(tracks, names, targets)
     doubts = [warning for found in seen for track in found for warning in track.warnings]
     conclude = _observed if targets == 1 else _several_observed
-    return conclude(tracks, rig, clock, given, names, doubts, progress)
+    return conclude(tracks, rig, clock, starts, names, doubts, progress)
 
 
 def observe_tracks(
@@ -230,9 +231,7 @@ def observe_tracks(
         raise ValueError(f"tracks: must have two frames or more, got {[*map(len, raw)]}")
     clock = Clock.of_tracks(t, raw)
     called = [f"tracks[{i}]" for i in range(len(raw))] if names is None else names
-    names = [str(name) for name in check_items("names", called)]
-    if len(names) != len(raw):
-        raise ValueError(f"names: must be one per track, got {len(names)} for {len(raw)}")
+    names = [str(name) for name in check_items("names", called, len(raw), "track")]
     for name, track, camera in zip(names, raw, rig.cameras, strict=True):
         seen = track[np.isfinite(track)]
         if seen.size and (np.abs(seen) <= 1).all():
@@ -384,30 +383,15 @@ def _check_lags(lags: Sequence[float] | None, clock: Clock, names: Sequence[str]
     return given
 
 
-def _check_paths(paths: Sequence[str | Path], rig: Rig | None) -> list[Path]:
-    """One file name per camera."""
-    if isinstance(paths, str) or not isinstance(paths, Iterable):
-        raise ValueError(f"paths: must be a list of files, one per camera, got {shown(paths)}")
-    files = [check_path(f"paths[{i}]", path) for i, path in enumerate(paths)]
-    if rig is not None and len(files) != len(rig.cameras):
-        raise ValueError(
-            f"paths: there must be one video per camera of the rig ({len(rig.cameras)}), "
-            f"got {len(files)}"
-        )
-    return files
-
-
 def _check_several(
     targets: int, rig: Rig | None, detector: str | os.PathLike, hints: Sequence[Hint | None] | None
 ) -> None:
     """That several targets can be told apart."""
-    if rig is None:
-        raise ValueError(f"rig: must be given to tell {targets} targets apart, got None")
-    if len(rig.cameras) < 3 or not rig.is_measured:
-        known = "known" if rig.is_measured else "unknown"
+    known = len(rig.cameras) if rig is not None and rig.is_measured else 0
+    if known < 3:
         raise ValueError(
-            f"targets: {targets} need three cameras of known places and directions, got "
-            f"{len(rig.cameras)} of {known} ones"
+            f"targets: {targets} need three cameras of known places and directions, got {known} "
+            "of known ones"
         )
     if detector != "auto" or any(hints or ()):
         raise ValueError(
@@ -482,26 +466,18 @@ def _rig_warnings(
     They miss it by `missed` pixels. The tracks are those at the lags, `best` are the lags that the
     tracks themselves tell.
     """
-    wrong_lag = _apart(lags, best, _OTHER_LAG)
-    if wrong_lag and max(missed) <= cameras.DISAGREEMENT:
-        return [
-            "the lags that are given differ from those of the tracks: "
-            f"({cameras.list_lags(lags)}) for ({cameras.list_lags(best.frames)}) frames: "
-            "leave them out, or check"
-        ]
-    sizes = ", ".join(f"{size:.1f}" for size in missed)
-    apart = (
-        f"in one frame of ten, tracked and reconstructed target lie more than {sizes} pixels apart"
-    )
-    if wrong_lag:  # by too little to refuse them
-        return [
-            f"the rig does not agree with the tracks at the lags that are given: {apart}: the lags "
-            f"({cameras.list_lags(best.frames)}) would explain it best"
-        ]
-    why = cameras.explain(tracks, given, learned)
-    worst = max(missed)
+    told, worst, where = f"({cameras.list_lags(best.frames)})", max(missed), ""
     few = worst <= cameras.GROSS
-    if why is not None and (few or why.left <= max(cameras.GROSS / 2, worst / 3)):
+    if _apart(lags, best, _OTHER_LAG):  # by too little to refuse them
+        if worst <= cameras.DISAGREEMENT:
+            return [
+                "the lags that are given differ from those of the tracks: "
+                f"({cameras.list_lags(lags)}) for {told} frames: leave them out, or check"
+            ]
+        advice, where = f"the lags {told} would explain it best", " at the lags that are given"
+    elif (why := cameras.explain(tracks, given, learned)) is not None and (
+        few or why.left <= max(cameras.GROSS / 2, worst / 3)
+    ):
         advice = f"{why.text(names)} would explain it best"
     elif not few and cameras.smooth(tracks, learned):
         advice = (
@@ -513,7 +489,11 @@ def _rig_warnings(
         )
     else:
         return []
-    return [f"the rig does not agree with the tracks: {apart}: {advice}"]
+    sizes = ", ".join(f"{size:.1f}" for size in missed)
+    return [
+        f"the rig does not agree with the tracks{where}: in one frame of ten, tracked and "
+        f"reconstructed target lie more than {sizes} pixels apart: {advice}"
+    ]
 
 
 # ---------------------------------------------------------------------------------------- the law
@@ -624,7 +604,7 @@ def discover_from_videos(
         See `observe` and `discover`. What can be told before a video is tracked is.
     """
     check_integer("targets", targets, least=1)
-    how, unasked = _checked(degree, library, order, origin, orientation, seed, targets)
+    how, unasked = checked(degree, library, order, origin, orientation, seed, 3 * targets)
     how |= {"progress": progress}
     seen = observe(
         paths, rig, t, lags=lags, detector=detector, hints=hints, targets=targets,
@@ -681,7 +661,7 @@ def discover_from_tracks(
         If a file is missing or holds no track, if times are given twice or not at all, or as
         `observe_tracks` and `discover` do.
     """
-    how, unasked = _checked(degree, library, order, origin, orientation, seed)
+    how, unasked = checked(degree, library, order, origin, orientation, seed)
     how |= {"progress": progress}
     check_instance("rig", rig, Rig)
     read = _read(tracks, rig, individual)
@@ -693,14 +673,14 @@ def discover_from_tracks(
     return _with_law(seen, names, how, unasked)
 
 
-def _checked(
+def checked(
     degree: int | None,
     library: Library | None,
     order: int | str,
     origin: str,
     orientation: str,
     seed: int,
-    targets: int = 1,
+    coordinates: int = 3,
 ) -> tuple[dict[str, Any], bool]:
     """What `discover` takes beside the path, checked before anything is tracked.
 
@@ -708,8 +688,8 @@ def _checked(
     """
     terms = dynamics.check_library(degree, library)
     dynamics.check_order(order, origin)
-    dynamics.check_orientation(orientation, terms, 3 * targets, origin)
-    dynamics.Form.of(dynamics.variable_names(3 * targets), terms, 2 if order == 2 else 1)
+    dynamics.check_orientation(orientation, terms, coordinates, origin)
+    dynamics.Form.of(dynamics.variable_names(coordinates), terms, 2 if order == 2 else 1)
     check_integer("seed", seed)
     chosen = {"order": order, "origin": origin, "orientation": orientation}
     unasked = degree is None and library is None and order == "auto"
@@ -746,14 +726,11 @@ def _read(
             read.append(TrackFile(name, check_rows(name, cast("ArrayLike", given), 2), None))
     # Files that count frames from the start of their videos may begin at different ones.
     first = min((track.start for track in read), default=0)
-    for i, (one, camera) in enumerate(zip(read, rig.cameras, strict=False)):
-        read[i] = replace(one, pixels=one.downwards(camera.image_size[1]))
-    return [
-        replace(
-            one, pixels=np.pad(one.pixels, ((one.start - first, 0), (0, 0)), constant_values=np.nan)
-        )
-        for one in read
-    ]
+    heights = chain((camera.image_size[1] for camera in rig.cameras), repeat(0))
+    for i, (one, height) in enumerate(zip(read, heights, strict=False)):
+        rows = (one.start - first, 0), (0, 0)
+        read[i] = replace(one, pixels=np.pad(one.downwards(height), rows, constant_values=np.nan))
+    return read
 
 
 def _times(
@@ -811,7 +788,16 @@ _STILL = 2.0  # pixels; ... or one that stays within that, ...
 _SPARSE = 0.5  # ... or of a target that is seen in fewer frames than that, may be of something else
 
 
-class Refused(ValueError):
+class _Ended(BaseException):
+    """An exception that holds what there is already."""
+
+    def __init__(self, message: str, step: str, tracks: Sequence[Floats]) -> None:
+        super().__init__(message)
+        self.step = step
+        self.tracks = tuple(tracks)
+
+
+class Refused(_Ended, ValueError):
     """Tracks from which no path or law can be had.
 
     Parameters
@@ -823,19 +809,9 @@ class Refused(ValueError):
         Pixels of the target in each video up to there.
     """
 
-    def __init__(self, message: str, step: str, tracks: Sequence[Floats]) -> None:
-        super().__init__(message)
-        self.step = step
-        self.tracks = tuple(tracks)
 
-
-class Stopped(KeyboardInterrupt):
+class Stopped(_Ended, KeyboardInterrupt):
     """An interruption when there were tracks already; see `Refused`."""
-
-    def __init__(self, step: str, tracks: Sequence[Floats]) -> None:
-        super().__init__("stopped before there was a law")
-        self.step = step
-        self.tracks = tuple(tracks)
 
 
 @contextmanager
@@ -849,7 +825,7 @@ def refusing(step: str, tracks: Sequence[Floats], names: Sequence[str]) -> Itera
     except (Refused, Stopped):
         raise
     except KeyboardInterrupt:
-        raise Stopped(step, tracks) from None
+        raise Stopped("stopped before there was a law", step, tracks) from None
     except ValueError as error:
         message = f"{error}; likely causes, in this order: {_likely_causes(step, tracks, names)}"
         raise Refused(message, step, tracks) from None

@@ -16,19 +16,9 @@ import numpy as np
 
 from .arrays import Floats
 from .cameras import Lags, OrthographicCamera, Rig
-from .checks import check_array, check_integer, check_number, check_positive, check_vector, shown
-from .dynamics import (
-    Discovery,
-    Round,
-    Swing,
-    check_library,
-    check_order,
-    discover,
-    homogeneous,
-    on_circle,
-    smooth,
-)
-from .pipeline import VideoDiscovery, check_found, refusing
+from .checks import check_array, check_number, check_positive, check_vector, shown
+from .dynamics import Discovery, Round, Swing, discover, homogeneous, on_circle, smooth
+from .pipeline import VideoDiscovery, check_found, checked, refusing
 from .vision import Hint, check_detector, frame_clock, track, video_info
 
 MARK = 1.0
@@ -162,9 +152,7 @@ def discover_from_video(
     >>> print(found, found.g)
     """
     check_detector(detector)
-    check_order(order, "learn")
-    check_library(degree, None)
-    check_integer("seed", seed)
+    checked(degree, None, order, "learn", "data", seed, 2)
     share = check_number("length_error", length_error)
     if not 0 <= share < 1:
         raise ValueError(f"length_error: must be a share of the length, 0 to 1, got {share}")
@@ -190,14 +178,12 @@ def discover_from_video(
     known = slice(3 if corners is None else 1) if pixels else slice(0)
     modes = np.stack([error * x, *_tilts(camera, seen.pixels, middle)])[known]
     with refusing("law", [seen.pixels], [name]):
-        law = _law(t, x, modes, degree, order, seed, progress)
-    swing = law.swing
-    doubts = law.warnings if swing is None else (*swing.circle.warnings, *swing.law.warnings)
+        law, circle = _law(t, x, modes, degree, order, seed, progress)
+    doubts = law.warnings if circle is None else (*circle.warnings, *law.warnings)
     found = PlaneDiscovery(
         tracks=(seen.pixels,), rig=rig, lags=Lags(np.zeros(1), np.ones(1), np.zeros(1), 0.0),
         t=t, x=_in_space(x), systematic=np.pad(modes, ((0, 0), (0, 0), (0, 1))),
-        warnings=(), discovery=law if swing is None else swing.law,
-        unit=unit, circle=None if swing is None else swing.circle,
+        warnings=(), discovery=law, unit=unit, circle=circle,
     )  # fmt: skip
     contradicted = _contradicted(found, up is not None or corners is not None, corners is None)
     return replace(found, warnings=(*seen.warnings, *doubts, *contradicted))
@@ -302,8 +288,10 @@ def _tilts(camera: PlaneCamera, pixels: Floats, middle: Floats) -> list[Floats]:
 def _law(
     t: Floats, x: Floats, modes: Floats, degree: int | None, order: int | str, seed: int,
     progress: bool | None,
-) -> Discovery:  # fmt: skip
+) -> tuple[Discovery, Round | None]:  # fmt: skip
     """The law of places: of nested ones the simplest that the data bear, or the one asked for.
+
+    Or that of an angle, and the circle on which it is.
 
     A plane that lies askew bends a path a little as other forces would: laws are told from each
     other without its modes, which are in the error bars of what flies and of what swings round.
@@ -312,15 +300,14 @@ def _law(
     if degree is None and order == "auto":
         flight = homogeneous(t[there], x[there], ("x", "y"), modes[:, there])
         if flight is not None:
-            return flight
+            return flight, None
         degree, order, axes = 1, 2, _axes(t[there], x[there])
     law = discover(t, x @ axes.T, degree, seed, progress, modes[:1] @ axes.T, order)
     if law.swing is not None:
-        circle = on_circle(x, law.swing.circle.axes[0], modes)
-        law = replace(law, swing=replace(law.swing, circle=circle))
+        return law.swing.law, on_circle(x, law.swing.circle.axes[0], modes)
     if len(axes) == 1:
         law = replace(law, orientation=np.pad(axes, ((0, 0), (0, 1))))
-    return law
+    return law, None
 
 
 def _axes(t: Floats, x: Floats) -> Floats:

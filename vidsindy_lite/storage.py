@@ -39,17 +39,21 @@ _HEAD = 4096  # characters that tell text from what is none
 
 
 @contextmanager
-def reading(name: str, path: Path) -> Iterator[None]:
-    """Whatever the content of a file makes a reader raise, as one line that names the file."""
+def reading(name: str, path: Path, kind: str | None = None) -> Iterator[None]:
+    """Whatever the content of a file makes a reader raise, as one line that names the file.
+
+    And what kind of file it has to be, if that is what is wrong with it.
+    """
     try:
         yield
-    except MALFORMED as error:
-        first = (str(error).splitlines() or [""])[0]
+    except (*MALFORMED, cv2.error) as error:
+        first = (str(error).splitlines() or [""])[0] or type(error).__name__
         if isinstance(error, RecursionError):
-            first = "must not be nested so deeply"
-        elif not isinstance(error, ValueError):
+            first = f"must be nested {DEEPEST} levels deep at most"
+        elif kind is None and not isinstance(error, ValueError):
             first = f"must not be malformed ({type(error).__name__}: {first:.60})"
-        raise ValueError(f"{name}: {first}, in '{path}'") from error
+        told = f"{first}, in '{path}'" if kind is None else f"must be {kind}, got '{path}': {first}"
+        raise ValueError(f"{name}: {told}") from error
 
 
 def check_file(name: str, path: str | os.PathLike, what: str = "file") -> Path:
@@ -60,17 +64,15 @@ def check_file(name: str, path: str | os.PathLike, what: str = "file") -> Path:
     FileNotFoundError, ValueError
     """
     file = check_path(name, path)
-    try:
-        found = file.is_file()
-    except ValueError:  # no system has names with null characters
-        found = False
-    if not found:
+    if not file.is_file():
         raise FileNotFoundError(f"{name}: no such {what}, got '{path}'")
     return file
 
 
 def read_text(name: str, path: Path, kind: str, fallback: str | None = None) -> str:
     """A file of text in UTF-8, or in UTF-16 if its first bytes say so, or in the fallback.
+
+    That is an encoding in which all bytes are characters.
 
     Raises
     ------
@@ -84,14 +86,11 @@ def read_text(name: str, path: Path, kind: str, fallback: str | None = None) -> 
         )
     raw = path.read_bytes()
     encoding = next((known for mark, known in _MARKS.items() if raw.startswith(mark)), "utf-8")
-    text = None
-    for one in filter(None, (encoding, fallback)):
-        try:
-            text = raw.decode(one)
-            break
-        except UnicodeDecodeError:
-            continue
-    if text is None or any(mark < " " and not mark.isspace() for mark in text[:_HEAD]):
+    try:
+        text = raw.decode(encoding)
+    except UnicodeDecodeError:
+        text = raw.decode(fallback) if fallback else "\0"  # which no text holds
+    if any(mark < " " and not mark.isspace() for mark in text[:_HEAD]):
         raise ValueError(f"{name}: must be {kind} in UTF-8, got '{path.name}', which is none")
     digits = re.search(rf"\d{{{MOST_DIGITS},}}", text)
     if digits:
@@ -120,24 +119,18 @@ def read_tree(name: str, path: Path, suffix: str) -> Any:
     """
     kind = f"a {suffix[1:].upper()} file"
     text = read_text(name, path, kind)
-    try:
+    with reading(name, path, kind):
         if suffix == ".json" and '"opencv-matrix"' not in text:
             return json.loads(text)
         if _depth(text, suffix) > DEEPEST:
             raise RecursionError
         if suffix == ".toml":
             return tomllib.loads(text)
-        memory = cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY
-        storage = cv2.FileStorage(text, memory)
+        storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         try:
             return _plain(storage.root())
         finally:
             storage.release()
-    except (*MALFORMED, cv2.error) as error:
-        first = (str(error).splitlines() or [""])[0] or type(error).__name__
-        if isinstance(error, RecursionError):
-            first = f"it must be nested {DEEPEST} levels deep at most"
-        raise ValueError(f"{name}: must be {kind}, got '{path}': {first}") from None
 
 
 def _depth(text: str, suffix: str) -> int:
@@ -183,15 +176,9 @@ def read_arrays(name: str, path: Path) -> Any:
     ValueError
         If it is none.
     """
-    try:
-        with open(path, "rb") as file:
-            loaded = np.load(file)
-            return loaded if isinstance(loaded, np.ndarray) else dict(loaded)
-    except MALFORMED as error:
-        first = (str(error).splitlines() or [""])[0] or type(error).__name__
-        raise ValueError(
-            f"{name}: must be a {path.suffix} file of numbers, got '{path}': {first:.80}"
-        ) from None
+    with reading(name, path, f"a {path.suffix} file of numbers"), open(path, "rb") as file:
+        loaded = np.load(file)
+        return loaded if isinstance(loaded, np.ndarray) else dict(loaded)
 
 
 # ------------------------------------------------------------------------------------------ written
@@ -234,10 +221,8 @@ def _is_running(process: int) -> bool:
     """Whether a process of this number is there; where that cannot be told, it is."""
     try:
         os.kill(process, 0) if os.name == "posix" else None
-    except ProcessLookupError:
-        return False
-    except (PermissionError, OverflowError):
-        return True
+    except (ProcessLookupError, PermissionError, OverflowError) as error:
+        return not isinstance(error, ProcessLookupError)
     return True
 
 

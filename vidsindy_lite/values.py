@@ -100,8 +100,7 @@ def built(kind: type, parts: dict[str, Any], known: dict[str, Any]) -> Any:
         If a field is missing, of another type, or none.
     """
     hints = get_type_hints(kind, localns=known)
-    names = [field.name for field in fields(kind)]
-    strange = next((name for name in parts if name not in names), None)
+    strange = next((name for name in parts if name not in hints), None)
     if strange is not None:
         raise ValueError(f"{kind.__name__} must have no {strange!r:.40}")
     for name, value in parts.items():

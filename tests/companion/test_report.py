@@ -178,7 +178,7 @@ def test_other_peoples_files_are_not_overwritten(tmp_path):
     (tmp_path / "report.html").write_text("a report of mine")
     with pytest.raises(ValueError, match=r"got '.*' with report\.html, rig\.toml"):
         check_folder_is_free(tmp_path)
-    with pytest.raises(ValueError, match="out: the folder must be one that exists, got"):
+    with pytest.raises(ValueError, match="out: the folder must be one that exists and can be"):
         check_folder_is_free(tmp_path / "rig.toml")
     with pytest.raises(ValueError, match="out: the folder around it must be one that exists"):
         check_folder_is_free(tmp_path / "a" / "b")

@@ -128,9 +128,9 @@ def test_what_differs_is_refreshed_and_nothing_else_though_a_disk_was_full(
     record = good.root / "figures" / "table_1.json"
     before = outputs(good)
     record.write_text(record.read_text().replace("1.0", "1.01"))
-    for module in ("compare", "run"):
+    for writer in ("compare.write_files", "run.write_file"):
         with monkeypatch.context() as patch:
-            patch.setattr(f"vidsindy_lite.companion.{module}.write_file", full_disk)
+            patch.setattr(f"vidsindy_lite.companion.{writer}", full_disk)
             (outcome,) = run(root=good.root)
         assert "No space left on device" in outcome.error
     (outcome,) = run(root=good.root)

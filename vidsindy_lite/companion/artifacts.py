@@ -15,7 +15,6 @@ VIDSINDY_NOTEBOOK. Without it, a cell that somebody runs by hand writes to
 build/interactive/figures: only the runner writes the committed ones.
 """
 
-import base64
 import io
 import json
 import os
@@ -34,14 +33,14 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
-from ..storage import library_versions, repository_root, write_file
+from ..storage import library_versions, repository_root, write_file, write_files
 from ..values import as_json
 from .report import page
 
 INDEX = "README.md"
 DIGITS = 6  # of the numbers in the records
 PICTURE = 83  # milliseconds that one of an animation stays
-SAMPLED = 20_000  # pixels of a picture that have a say in its palette
+PALETTE = Image.Quantize.FASTOCTREE  # a small target keeps its colour, and so does white
 SLIDER_DPI = 100  # dots per inch of its frames
 PICTURES = {"figure": [".png"], "animation": [".gif"], "table": []}  # files of a kind
 
@@ -99,9 +98,9 @@ def save_figure(
     TypeError
         If something in `numbers` is none of the above.
     """
-    record = _record(figure_id, "figure", caption, "numbers", numbers, tolerance)
+    record = _record(figure_id, "figure", caption, numbers, tolerance)
     record["words"] = _words(figure)
-    _write(record, ".png", _png(figure))
+    _write(record, _png(figure))
 
 
 def save_animation(
@@ -127,15 +126,13 @@ def save_animation(
     ValueError, TypeError
         As `save_figure` does.
     """
-    record = _record(animation_id, "animation", caption, "numbers", numbers, None)
-    palette = _palette(np.concatenate(pictures))
-    first, *rest = (
-        Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
-        for picture in pictures
-    )
+    record = _record(animation_id, "animation", caption, numbers)
+    palette = Image.fromarray(np.concatenate(pictures)).quantize(256, PALETTE)
+    images = (Image.fromarray(picture) for picture in pictures)
+    first, *rest = (one.quantize(palette=palette, dither=Image.Dither.NONE) for one in images)
     durations, file = [PICTURE] * len(rest) + [3000], io.BytesIO()
     first.save(file, "GIF", save_all=True, append_images=rest, duration=durations, loop=0)
-    _write(record, ".gif", file.getvalue())
+    _write(record, file.getvalue())
 
 
 def save_slider(
@@ -176,33 +173,16 @@ def save_slider(
         plt.close(figure)
     (width, height), strip = frames[0].size, io.BytesIO()
     Image.fromarray(np.concatenate([np.asarray(frame) for frame in frames])).save(strip, "PNG")
-    coded = base64.b64encode(with_palette(strip.getvalue())).decode()
-    shown = {"labels": list(figures), "caption": caption, "strip": coded}
+    packed = with_palette(strip.getvalue())
+    shown = {"labels": list(figures), "caption": caption, "strip": packed}
     return HTML(page("slider.html", width=width, height=height, **shown))
 
 
 def with_palette(png: bytes) -> bytes:
     """A PNG with 256 colours, a third of the size; as it was if that is not smaller."""
     image, small = Image.open(io.BytesIO(png)).convert("RGB"), io.BytesIO()
-    reduced = image.quantize(palette=_palette(np.asarray(image)), dither=Image.Dither.NONE)
-    reduced.save(small, "PNG", optimize=True)
+    image.quantize(256, PALETTE).save(small, "PNG", optimize=True)
     return min(png, small.getvalue(), key=len)
-
-
-def _palette(pixels: np.ndarray) -> Image.Image:
-    """256 colours for a picture: as far apart as its own, then moved to where its pixels are.
-
-    Of colours that differ by less than eight grey levels the most frequent is a candidate, however
-    rare: a small target keeps its colour, and noise has few enough to choose from quickly.
-    """
-    flat = pixels.reshape(-1, 3)
-    codes, counts = np.unique(flat @ np.array([1 << 16, 1 << 8, 1]), return_counts=True)
-    codes = codes[np.argsort(-counts, kind="stable")]
-    _, firsts = np.unique(codes & 0xF8F8F8, return_index=True)
-    colours = np.stack([codes >> 16, codes >> 8, codes], axis=-1)[firsts].astype(np.uint8)
-    some = flat[:: max(1, len(flat) // SAMPLED)]
-    strip = Image.fromarray(np.concatenate([colours, some])[None])
-    return strip.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=1)
 
 
 def _png(figure: Figure) -> bytes:
@@ -259,7 +239,7 @@ def save_table(
     for row in copies:
         if isinstance(row.get("seconds"), int | float):
             row["seconds"] = float(f"{row['seconds']:.2g}")
-    record = _record(table_id, "table", caption, "rows", copies, tolerance)
+    record = _record(table_id, "table", caption, copies, tolerance)
     _write(record)
     return Markdown(table_text(record))
 
@@ -286,9 +266,8 @@ def _record(
     artifact_id: str,
     kind: str,
     caption: str,
-    holds: str,
     content: Mapping | list,
-    tolerance: float | Mapping[str, float] | None,
+    tolerance: float | Mapping[str, float] | None = None,
 ) -> dict:
     """A record, checked."""
     if not re.fullmatch(r"[A-Za-z0-9_-]+", artifact_id) or artifact_id == Path(INDEX).stem:
@@ -299,7 +278,8 @@ def _record(
     caption = " ".join(caption.split())
     if not caption:
         raise ValueError(f"caption: {kind} {artifact_id!r} needs a sentence, got an empty one")
-    known = {name for row in (content if isinstance(content, list) else [content]) for name in row}
+    holds, rows = ("rows", content) if isinstance(content, list) else ("numbers", [content])
+    known = {name for row in rows for name in row}
     if strange := set(tolerance if isinstance(tolerance, Mapping) else ()) - known:
         raise ValueError(
             f"tolerance: must name what is in {kind} {artifact_id!r} ({', '.join(sorted(known))}), "
@@ -315,7 +295,7 @@ def _record(
     }
 
 
-def _write(record: dict, suffix: str = "", picture: bytes = b"") -> None:
+def _write(record: dict, *picture: bytes) -> None:
     """Write a picture, then its record, a line per entry and per row."""
 
     def entry(value: object) -> str:
@@ -326,11 +306,10 @@ def _write(record: dict, suffix: str = "", picture: bytes = b"") -> None:
             return "[\n" + ",\n".join(f"  {json.dumps(item)}" for item in value) + "\n ]"
         return json.dumps(value)
 
-    folder = figures_folder()
-    if picture:
-        write_file(folder / f"{record['id']}{suffix}", picture)
     lines = (f" {json.dumps(key)}: {entry(value)}" for key, value in record.items())
-    write_file(folder / f"{record['id']}.json", ("{\n" + ",\n".join(lines) + "\n}\n").encode())
+    text = "{\n" + ",\n".join(lines) + "\n}\n"
+    contents = zip(reversed(files_of(record)), (*picture, text.encode()), strict=True)
+    write_files({figures_folder() / name: content for name, content in contents})
 
 
 def read_records(folder: Path) -> dict[str, dict]:
@@ -365,9 +344,6 @@ def files_of(record: dict) -> list[str]:
 
 def write_index(folder: Path) -> None:
     """Write the folder's index page (README.md, which code hosts show) from the records."""
-    records = read_records(folder)
-    made: dict[str, list[dict]] = {}
-    for record in sorted(records.values(), key=lambda record: record["notebook"]):
-        made.setdefault(record["notebook"], []).append(record)
-    tables = {name: table_text(record) for name, record in records.items() if "rows" in record}
-    write_file(folder / INDEX, page("index.md", made=made, tables=tables).encode())
+    records = list(read_records(folder).values())
+    text = page("index.md", records=records, table_text=table_text)
+    write_file(folder / INDEX, text.encode())

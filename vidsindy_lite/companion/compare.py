@@ -20,7 +20,7 @@ from PIL import Image, ImageSequence
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from ..checks import check_path
-from ..storage import write_file
+from ..storage import write_file, write_files
 from .artifacts import files_of, read_records
 from .report import check_page, page
 
@@ -66,12 +66,8 @@ def differences(
     ValueError
         If one of them is no folder, or holds no figure or table.
     """
-    ours, theirs = _records("committed", committed), _records("regenerated", regenerated)
-    if notebook is not None:
-        ours, theirs = (
-            {name: record for name, record in records.items() if record["notebook"] == notebook}
-            for records in (ours, theirs)
-        )
+    ours = _records("committed", committed, notebook)
+    theirs = _records("regenerated", regenerated, notebook)
     found = {}
     for name in sorted(ours | theirs):
         if name not in ours or name not in theirs:
@@ -105,15 +101,8 @@ def write_differences(
     """
     output = check_page("output", output, "compare.html")
     found = differences(committed, regenerated)
-    pictures = {
-        name: {
-            side: base64.b64encode(picture.read_bytes()).decode()
-            for side, folder in (("committed", committed), ("regenerated", regenerated))
-            if (picture := Path(folder) / f"{name}.png").exists()
-        }
-        for name in found
-    }
-    write_file(output, page("compare.html", found=found, pictures=pictures).encode())
+    folders = {"committed": Path(committed), "regenerated": Path(regenerated)}
+    write_file(output, page("compare.html", found=found, folders=folders).encode())
     return found
 
 
@@ -151,8 +140,8 @@ def replace(committed: Path, regenerated: Path, names: Iterable[str]) -> None:
     old, new = read_records(committed), read_records(regenerated)
     for name in names:
         files = files_of(new[name]) if name in new else []
-        for file in reversed(files):  # the record last
-            write_file(committed / file, (regenerated / file).read_bytes())
+        # The record last.
+        write_files({committed / f: (regenerated / f).read_bytes() for f in reversed(files)})
         for file in set(files_of(old[name]) if name in old else []) - set(files):
             (committed / file).unlink(missing_ok=True)
 
@@ -258,14 +247,14 @@ def _strange(one: np.ndarray, other: np.ndarray) -> float:
 # ------------------------------------------------------------------------------------------ details
 
 
-def _records(name: str, folder: str | os.PathLike) -> dict[str, dict]:
-    """The records of a folder; one that is damaged is none."""
+def _records(name: str, folder: str | os.PathLike, notebook: str | None) -> dict[str, dict]:
+    """The records of a folder, or those of a notebook in it; one that is damaged is none."""
     folder = check_path(name, folder)
     if not folder.is_dir():
         raise ValueError(f"{name}: must be a folder, got '{folder}'")
     if not (records := read_records(folder)):
         raise ValueError(f"{name}: must hold figures or tables (*.json), got none in '{folder}'")
-    return records
+    return {n: one for n, one in records.items() if notebook in (None, one["notebook"])}
 
 
 def _first_difference(one: dict, other: dict) -> str | None:

@@ -17,10 +17,11 @@ import io
 import json
 import os
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from itertools import pairwise
 from pathlib import Path
-from typing import cast
+from typing import TypeAlias, cast
 
 import av
 import cv2
@@ -33,7 +34,7 @@ from matplotlib.font_manager import findfont, get_font
 from ..arrays import Floats, Image
 from ..cameras import DISAGREEMENT, Rig, stacked
 from ..checks import check_path
-from ..dynamics import Discovery, Quantity, Swing
+from ..dynamics import Discovery, Swing
 from ..pipeline import Refused, Stopped, VideoDiscovery
 from ..progress import bar
 from ..storage import write_file, write_files
@@ -46,14 +47,9 @@ LONGEST_NAME = 30  # characters above a picture
 PAGE, DATA, RIG, TRACKS = FILES = ("report.html", "result.json", "rig.toml", "tracks.csv")
 FORMAT = 1  # of result.json: counts up when what is in it changes its meaning
 
-STEPS = {
-    "track": "A target was not found in every video.",
-    "lags": "When each camera started could not be told.",
-    "cameras": "The cameras could not be learned.",
-    "law": "The path has no law that could be found.",
-}
 _TITLES = ("<title>Law of a moving target", "<title>No law: ")  # of pages that are ours
-_BEGIN = b'{\n "format": '  # of data that are
+_BEGIN = '{\n "format": '  # of data that are
+_HEAD = 1000  # characters
 
 FRAMES = 24  # of each video on the page
 _LONGEST = 1280  # pixels of a frame's longer side there
@@ -73,6 +69,12 @@ _PAGES = jinja2.Environment(
     undefined=jinja2.StrictUndefined,
     keep_trailing_newline=True,
 )
+_PAGES.filters |= {"base64": lambda data: base64.b64encode(data).decode()}
+_PAGES.globals |= {"data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS}
+
+
+Videos: TypeAlias = Sequence[str | Path] | None  # one per camera; None if there are tracks alone
+Options: TypeAlias = Mapping[str, object] | None  # how a law was asked for
 
 
 def page(template: str, **values: object) -> str:
@@ -90,9 +92,18 @@ def check_page(name: str, path: str | os.PathLike, template: str) -> Path:
     """
     path, kind = check_path(name, path), Path(template).stem
     mark = f'<meta name="generator" content="vidsindy_lite {kind}">'
-    if path.exists() and not (path.is_file() and mark in path.read_text("utf-8", "replace")):
+    if path.exists() and not _holds(path, mark):
         raise ValueError(f"{name}: must be a new file or an earlier page of {kind}, got '{path}'")
     return path
+
+
+def _holds(path: Path, *marks: str) -> bool:
+    """Whether a file is there and can be read, and one of these marks is near its beginning."""
+    try:
+        start = path.read_text("utf-8", "replace")[:_HEAD]
+    except OSError:
+        return False
+    return any(mark in start for mark in marks)
 
 
 # --------------------------------------------------------------------------------------- the report
@@ -109,15 +120,15 @@ def check_folder_is_free(folder: str | Path) -> Path:
     folder = check_path("out", folder)
     there = folder if folder.exists() else folder.absolute().parent
     whose = "folder" if there == folder else "folder around it"
-    if not there.is_dir():
-        raise ValueError(f"out: the {whose} must be one that exists, got '{folder}'")
     try:
-        with tempfile.TemporaryFile(dir=there):
-            pass
+        tempfile.TemporaryFile(dir=there).close()
     except OSError:
-        raise ValueError(f"out: the {whose} must be writable, got '{folder}'") from None
+        rule = "must be one that exists and can be written to"
+        raise ValueError(f"out: the {whose} {rule}, got '{folder}'") from None
     strange = [name for name in FILES if (folder / name).exists()]
-    if strange and not _is_earlier(folder):
+    page, data = folder / PAGE, folder / DATA  # an interruption may have left the data alone
+    is_earlier = _holds(page, *_TITLES) or not page.exists() and _holds(data, _BEGIN)
+    if strange and not is_earlier:
         raise ValueError(
             f"out: must hold no files of the names {', '.join(FILES)} but of an earlier report, "
             f"got '{folder}' with {', '.join(strange)}"
@@ -125,24 +136,8 @@ def check_folder_is_free(folder: str | Path) -> Path:
     return folder
 
 
-def _is_earlier(folder: Path) -> bool:
-    """Whether a folder holds an earlier report, or what an interruption has left of one."""
-    page, data = folder / PAGE, folder / DATA
-    try:
-        if page.exists():
-            return any(mark in page.read_text("utf-8", "replace") for mark in _TITLES)
-        with data.open("rb") as file:
-            return file.read(len(_BEGIN)) == _BEGIN
-    except OSError:
-        return False
-
-
 def write_report(
-    found: VideoDiscovery,
-    paths: Sequence[str | Path] | None,
-    folder: str | Path,
-    options: Mapping[str, object] | None = None,
-    progress: bool | None = None,
+    found: VideoDiscovery, paths: Videos, folder: str | Path, options: Options = None
 ) -> Path:
     """Write the report on a law.
 
@@ -155,8 +150,6 @@ def write_report(
         Where; the files of an earlier report are replaced.
     options : mapping, optional
         How the law was asked for, to be told in the report.
-    progress : bool, optional
-        Whether a progress bar is shown; by default after two seconds, if a person watches.
 
     Returns
     -------
@@ -175,16 +168,19 @@ def write_report(
     content = summary(found, paths, options)
     files = _data(content, found.t, found.tracks)
     files |= {RIG: found.rig.text()} if len(found.rig.cameras) > 1 else {}
-    _put(folder, files | {PAGE: _page(found, paths, content, progress)})
-    return folder / PAGE
+    total = 2 + (paths is not None) + 2 * (len(found.rig.cameras) > 1)
+    figures = bar(None, "report", iterable=_figures(found, paths), total=total)
+    film = None if paths is None else law_over_videos(found, paths)
+    drawn = {"figures": figures, "film": film, "limit": DISAGREEMENT}
+    return _put(folder, files | {PAGE: page("report.html", found=found, **drawn, **content)})
 
 
 def write_refusal(
     refused: Refused | Stopped,
-    paths: Sequence[str | Path] | None,
+    paths: Videos,
     rig: Rig | None,
     folder: str | Path,
-    options: Mapping[str, object] | None = None,
+    options: Options = None,
 ) -> Path:
     """Write what is known where no law was found: the tracks over the videos, and what failed.
 
@@ -202,33 +198,23 @@ def write_refusal(
         Of the page.
     """
     folder = check_folder_is_free(folder).absolute()
-    names = _names(paths, len(refused.tracks))
+    seen = [np.isfinite(track).all(axis=1) for track in refused.tracks]
     content: dict[str, object] = {
         "format": FORMAT, "status": "refused", "step": refused.step, "error": str(refused),
-        "videos": names, "options": dict(options or {}),
+        "videos": _names(paths, len(seen)), "options": dict(options or {}),
         "tracks": [as_json(track, "tracks") for track in refused.tracks],
-        "share_of_frames_seen": [float(np.isfinite(t).all(axis=1).mean()) for t in refused.tracks],
+        "share_of_frames_seen": [float(one.mean()) for one in seen],
     }  # fmt: skip
     # In the middle of what is seen of the target in each view.
-    seen = [np.flatnonzero(np.isfinite(track).all(axis=1)) for track in refused.tracks]
-    shown = [int(k[len(k) // 2]) if len(k) else 0 for k in seen]
-    sizes = [camera.image_size for camera in rig.cameras] if rig else [(1, 1)] * len(names)
-    images = [
-        np.full((height, width, 3), 255, np.uint8) if paths is None else read_frame(paths[i], k)
-        for i, ((width, height), k) in enumerate(zip(sizes, shown, strict=True))
-    ]
-    # See `_figures`.
-    plt.draw_if_interactive()
-    with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
-        look = _encoded(_look(images, names, shown, refused.tracks, shown))
+    shown = [int(np.flatnonzero(one)[one.sum() // 2]) if one.any() else 0 for one in seen]
+    sizes = [camera.image_size for camera in rig.cameras] if rig else [(1, 1)] * len(seen)
+    look = _picture(_look, paths, sizes, shown, refused.tracks, shown)
     frames = np.arange(max(len(track) for track in refused.tracks), dtype=float)
     files = _data(content, frames, refused.tracks, "frame")
-    text = page("refusal.html", look=look, what=STEPS[refused.step], data_file=DATA, **content)
-    _put(folder, files | {PAGE: text})
-    return folder / PAGE
+    return _put(folder, files | {PAGE: page("refusal.html", look=look, **content)})
 
 
-def _put(folder: Path, texts: Mapping[str, str]) -> None:
+def _put(folder: Path, texts: Mapping[str, str]) -> Path:
     """Put the files of a report into its folder, and take away those of an earlier one."""
     check_folder_is_free(folder)  # again: a while has passed
     is_new = not folder.exists()
@@ -241,6 +227,7 @@ def _put(folder: Path, texts: Mapping[str, str]) -> None:
                 folder.rmdir()
     for name in set(FILES) - set(texts):
         (folder / name).unlink(missing_ok=True)
+    return folder / PAGE
 
 
 def _data(
@@ -251,26 +238,18 @@ def _data(
     columns = [f"{axis}{i + 1}{n}" for i in range(len(tracks)) for n in several for axis in "uv"]
     longest = len(instants)
     whole = [np.pad(t, ((0, longest - len(t)), (0, 0)), constant_values=np.nan) for t in tracks]
-    rows = (
-        ",".join(f"{value:.10g}" if np.isfinite(value) else "" for value in row)
-        for row in np.column_stack((instants, *whole))
-    )
-    table = "\n".join([",".join((instant, *columns)), *rows]) + "\n"
-    return {DATA: json.dumps(content, allow_nan=False, indent=1) + "\n", TRACKS: table}
+    table, head = io.StringIO(), ",".join((instant, *columns))
+    np.savetxt(table, np.column_stack((instants, *whole)), "%.10g", ",", header=head, comments="")
+    text = json.dumps(content, allow_nan=False, indent=1) + "\n"
+    return {DATA: text, TRACKS: table.getvalue().replace("nan", "")}
 
 
-def _names(paths: Sequence[str | Path] | None, count: int) -> list[str]:
+def _names(paths: Videos, count: int) -> list[str]:
     """What the videos are called."""
-    if paths is None:
-        return [f"camera {i + 1}" for i in range(count)]
-    return [Path(path).name for path in paths]
+    return [f"camera {i + 1}" if paths is None else Path(paths[i]).name for i in range(count)]
 
 
-def summary(
-    found: VideoDiscovery,
-    paths: Sequence[str | Path] | None,
-    options: Mapping[str, object] | None = None,
-) -> dict[str, object]:
+def summary(found: VideoDiscovery, paths: Videos, options: Options = None) -> dict[str, object]:
     """All that the report tells, as plain data for JSON; None in place of NaN.
 
     Parameters
@@ -281,22 +260,25 @@ def summary(
     missed = found.residuals
     cameras = []
     names = _names(paths, len(found.rig.cameras))
+    rates = found.lags.rates / np.median(np.diff(found.t))
     for i, camera in enumerate(found.rig.cameras):
-        shot, seen = _shot(found, paths, i), np.isfinite(found.tracks[i]).all(axis=1)
+        seen = np.isfinite(found.tracks[i]).all(axis=1)
+        known = VideoInfo(len(found.tracks[i]), float(rates[i]), camera.image_size)
+        shot = known if paths is None else video_info(paths[i])
         length = np.linalg.norm(missed[i].reshape(-1, 2), axis=1)
         length = length[np.isfinite(length)]
         cameras.append({
-            "video": names[i], "frames": shot.frames, "fps": shot.fps,
-            "image_size": list(shot.size), "model": camera.model,
-            "position": camera.position, "normal": camera.normal,
-            "scale": camera.scale, "scale_error": camera.scale_error, "angle": camera.angle,
-            "homography": getattr(camera, "homography", None),
+            "video": names[i], "frames": shot.frames, "fps": shot.fps, "image_size": shot.size,
+            **_parts(camera, "model", "position", "normal", "scale", "scale_error", "angle"),
+            **_parts(camera, "homography"),
             "lag": found.lags.frames[i], "lag_error": found.lags.errors[i],
             "share_of_frames_seen": seen.mean(),
             "residual_rms": np.sqrt(np.mean(length**2)) if len(length) else np.nan,
             "residual_of_nine_in_ten": np.quantile(length, 0.9) if len(length) else np.nan,
         })  # fmt: skip
     law = found.discovery
+    states = np.split(law.curve(found.t), law.system.order, axis=1)  # places, and velocities
+    turn = np.eye(states[0].shape[1]) if law.orientation is None else law.orientation
     content = {
         "format": FORMAT,
         "status": found.status,
@@ -307,42 +289,27 @@ def summary(
             "orientation": law.orientation,
             "swing": None if found.swing is None else _swing(found.swing),
         },
-        "g": _quantity(found.g),
-        "period": _quantity(found.period),
+        "g": found.g and _parts(found.g, "value", "error"),
+        "period": found.period and _parts(found.period, "value", "error"),
         "noise": law.noise,
         "cameras": cameras,
         "options": dict(options or {}),
         "t": found.t,
         "x": found.x,
-        "curve": _in_rig_axes(law, law.curve(found.t)),
+        "curve": np.hstack([part @ turn for part in states]),
         "tracks": list(found.tracks),
         "residuals": missed,
     }
     return {key: as_json(value, f"found[{key!r}]") for key, value in content.items()}
 
 
-def _in_rig_axes(law: Discovery, curve: Floats) -> Floats:
-    """States of a law, (n, d), in the axes of the rig, its own being turned or not."""
-    if law.orientation is None:
-        return curve
-    return np.hstack([part @ law.orientation for part in np.split(curve, law.system.order, axis=1)])
-
-
-def _shot(found: VideoDiscovery, paths: Sequence[str | Path] | None, i: int) -> VideoInfo:
-    """What is known of a video, or of the track that there is in its place."""
-    if paths is not None:
-        return video_info(paths[i])
-    rate = found.lags.rates[i] / float(np.median(np.diff(found.t)))
-    return VideoInfo(len(found.tracks[i]), rate, found.rig.cameras[i].image_size)
-
-
 def _law(found: Discovery, frame: str) -> dict[str, object]:
     """One form of the law: as text, and term by term."""
-    law, deviations = found.native, found.native_standard_errors
-    origin, errors = found.offset, found.offset_errors
-    if frame == "data":
-        law, deviations = found.system, found.standard_errors
-        origin = errors = np.zeros(law.d)
+    law, deviations = found.system, found.standard_errors
+    origin = errors = np.zeros(law.d)
+    if frame == "native":
+        law, deviations = found.native, found.native_standard_errors
+        origin, errors = found.offset, found.offset_errors
     terms = [
         {
             "equation": side, "term": law.terms[row],
@@ -357,85 +324,58 @@ def _law(found: Discovery, frame: str) -> dict[str, object]:
 
 def _swing(swing: Swing) -> dict[str, object]:
     """A circle and the law of the angle on it."""
-    circle, g = swing.circle, swing.g
     return {
-        "centre": circle.centre, "centre_errors": circle.centre_errors,
-        "radius": circle.radius, "radius_error": circle.radius_error,
+        **_parts(swing.circle, "centre", "centre_errors", "radius", "radius_error"),
         "equations": swing.law.equations(),
-        "g": None if g is None else g.value, "g_error": None if g is None else g.error,
-        "warnings": [*circle.warnings, *swing.law.warnings],
+        "g": getattr(swing.g, "value", None), "g_error": getattr(swing.g, "error", None),
+        "warnings": [*swing.circle.warnings, *swing.law.warnings],
     }  # fmt: skip
 
 
-def _quantity(found: Quantity | None) -> dict[str, object] | None:
-    """A number with its error."""
-    return None if found is None else {"value": found.value, "error": found.error}
+def _parts(whole: object, *names: str) -> dict[str, object]:
+    """Attributes by their names; None where there is none."""
+    return {name: getattr(whole, name, None) for name in names}
 
 
-# ---------------------------------------------------------------------------------------- the page
+# ------------------------------------------------------------------------------------- its figures
 
 
-def _page(
-    found: VideoDiscovery,
-    paths: Sequence[str | Path] | None,
-    content: Mapping[str, object],
-    progress: bool | None = None,
-) -> str:
-    """The report as one HTML page."""
-    total = 2 + (paths is not None) + 2 * (len(found.rig.cameras) > 1)
-    figures = bar(progress, "report", iterable=_figures(found, paths), total=total)
-    about = {
-        "note": found.rig.note, "driven": found.driven, "limit": DISAGREEMENT,
-        "data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS,
-    }  # fmt: skip
-    about |= {"unit": getattr(found, "unit", "scene units")}  # metres or pixels of one camera
-    law = found.discovery
-    about |= {"axes": law.axes, "swing": "" if found.swing is None else str(found.swing)}
-    noises = zip(law.system.names, law.noise, strict=False)  # of velocities there is none
-    about |= {"noises": [(name, value) for name, value in noises if np.isfinite(value)]}
-    about |= {"physics": str(law.physics()) if law.system.order == 2 else ""}
-    film = None if paths is None else base64.b64encode(law_over_videos(found, paths)).decode()
-    return page("report.html", figures=figures, film=film, **about, **content)
-
-
-def _figures(
-    found: VideoDiscovery, paths: Sequence[str | Path] | None
-) -> Iterator[tuple[str, str]]:
-    """The figures one after the other, each a PNG in base64, by their names in the template."""
-    # The first use of pyplot switches the figures of a notebook on, the end of a style whatever was
-    # switched on meanwhile off again: so this comes first.
-    plt.draw_if_interactive()
-    with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
-        # Several targets are drawn as one that begins again.
-        t = stacked(np.tile(found.t[:, None], found.targets), 1)[:, 0]
-        x = stacked(found.x, 3)
-        d = 3 if np.nan_to_num(x)[:, 2].any() else 2  # in the plane of one camera
-        curves = {"reconstructed": x[:, :d]}
-        curves["curve that obeys the law"] = stacked(found.fitted, 3)[:, :d]
-        yield "path", _encoded(plot_path(t, curves, "not seen"))
-        seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
-        if seen.any() and paths is not None:
-            instant = int(seen.argmax())
-            shown = [found.lags.frame_at(i, instant) for i in range(len(paths))]
-            images = [read_frame(path, frame) for path, frame in zip(paths, shown, strict=True)]
-            names = _names(paths, len(paths))
-            yield "look", _encoded(_look(images, names, shown, found.tracks, instant))
-        if len(found.rig.cameras) > 1:
-            yield "rig", _encoded(plot_rig(found.rig, x))
-            missed = [stacked(one, 2) for one in found.residuals]
-            yield "residuals", _encoded(plot_residuals(t, missed, DISAGREEMENT))
-        yield "plateaus", _encoded(found.discovery.plot_path())
+def _figures(found: VideoDiscovery, paths: Videos) -> Iterator[tuple[str, bytes]]:
+    """The figures one after the other, each a PNG, by their names in the template."""
+    # Several targets are drawn as one that begins again.
+    t = stacked(np.tile(found.t[:, None], found.targets), 1)[:, 0]
+    x = stacked(found.x, 3)
+    d = 3 if np.nan_to_num(x)[:, 2].any() else 2  # in the plane of one camera
+    curves = {"reconstructed": x[:, :d]}
+    curves["curve that obeys the law"] = stacked(found.fitted, 3)[:, :d]
+    yield "path", _picture(plot_path, t, curves, "not seen")
+    seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
+    if seen.any() and paths is not None:
+        instant = int(seen.argmax())
+        shown = [found.lags.frame_at(i, instant) for i in range(len(paths))]
+        sizes = [camera.image_size for camera in found.rig.cameras]
+        yield "look", _picture(_look, paths, sizes, shown, found.tracks, instant)
+    if len(found.rig.cameras) > 1:
+        yield "rig", _picture(plot_rig, found.rig, x)
+        missed = [stacked(one, 2) for one in found.residuals]
+        yield "residuals", _picture(plot_residuals, t, missed, DISAGREEMENT)
+    yield "plateaus", _picture(found.discovery.plot_path)
 
 
 def _look(
-    images: Sequence[Image],
-    names: Sequence[str],
+    paths: Videos,
+    sizes: Sequence[tuple[int, int]],
     frames: Sequence[int],
     tracks: Sequence[Floats],
     index: int | Sequence[int],
 ) -> Figure:
-    """A frame of each view, with its whole track over it."""
-    titles = [f"{_short(name, i)}, frame {frames[i]}" for i, name in enumerate(names)]
+    """A frame of each view, white where there is no video, with its whole track over it."""
+    names = enumerate(_names(paths, len(tracks)))
+    titles = [f"{_short(name, i)}, frame {frames[i]}" for i, name in names]
+    images = [
+        np.full((height, width, 3), 255, np.uint8) if paths is None else read_frame(paths[i], k)
+        for i, ((width, height), k) in enumerate(zip(sizes, frames, strict=True))
+    ]
     return plot_frames(images, titles, tracks, index)
 
 
@@ -448,12 +388,17 @@ def _short(name: str, i: int) -> str:
     return fitting.replace("$", r"\$")
 
 
-def _encoded(figure: Figure) -> str:
-    """A figure as text, closed."""
+def _picture(plot: Callable[..., Figure], *shown: object) -> bytes:
+    """What a function plots, as a PNG."""
+    # The first use of pyplot switches the figures of a notebook on, the end of a style whatever was
+    # switched on meanwhile off again: so this comes first.
+    plt.draw_if_interactive()
     image = io.BytesIO()
-    figure.savefig(image, format="png", dpi=110)
-    plt.close(figure)
-    return base64.b64encode(image.getvalue()).decode()
+    with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
+        figure = plot(*shown)
+        figure.savefig(image, format="png", dpi=110)
+        plt.close(figure)
+    return image.getvalue()
 
 
 # -------------------------------------------------------------------------- the law over the videos
@@ -500,14 +445,12 @@ def _view(found: VideoDiscovery, path: Path, i: int, instants: range) -> Iterato
     scale = _HEIGHT / height
     size = 2 * round(width * scale / 2), _HEIGHT
     numbers = [found.lags.frame_at(i, k) for k in instants]
-    known = sorted({number for number in numbers if number >= 0})
-    small = {
-        number: cast("Image", cv2.resize(frame, size, interpolation=cv2.INTER_AREA))
-        for number, frame in zip(known, pick_frames(path, known), strict=False)
-    }
-    grey = np.full((_HEIGHT, size[0], 3), 128, np.uint8)
-    for j, number in enumerate(numbers):
-        shown = small.get(number, grey)
+    frames = pick_frames(path, sorted({number for number in numbers if number >= 0}))
+    grey = image = np.full((height, width, 3), 128, np.uint8)
+    for j, (before, number) in enumerate(pairwise([-1, *numbers])):
+        if number > max(before, -1):
+            image = next(frames, grey)
+        shown = cast("Image", cv2.resize(image, size, interpolation=cv2.INTER_AREA))
         for trail in pixels[:, instants[max(j - _TRAIL, 0)] : instants[j] + 1]:
             shown = _drawn(shown, (trail + 0.5) * scale - 0.5, spread * scale)
         yield shown
@@ -566,6 +509,5 @@ def _video(path: Path) -> dict[str, object]:
     for number, image in zip(numbers, pick_frames(path, numbers), strict=False):
         small = cv2.resize(image, None, fx=shrunk, fy=shrunk, interpolation=cv2.INTER_AREA)
         _, packed = cv2.imencode(".jpg", small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-        frames.append({"number": number, "image": base64.b64encode(packed.tobytes()).decode()})
-    width, height = info.size
-    return {"name": path.name, "width": width, "height": height, "frames": frames}
+        frames.append({"number": number, "image": packed.tobytes()})
+    return {"name": path.name, "size": info.size, "frames": frames}

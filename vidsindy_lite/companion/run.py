@@ -331,11 +331,8 @@ def _whole(path: Path, folder: Path, status: int) -> NotebookNode:
     """What papermill has executed, which ended with a status; an error if it is not all."""
     executed = nbformat.read(folder / EXECUTED, as_version=4)
     codes = [cell for cell in executed.cells if cell.cell_type == "code" and cell.source.strip()]
-    ended = [
-        cell for cell in codes
-        if cell.execution_count is None or cell.metadata.papermill.status != "completed"
-    ]  # fmt: skip
-    if status == 0 and not ended:
+    states = {cell.execution_count and cell.metadata.papermill.status for cell in codes}
+    if status == 0 and states <= {"completed"}:
         return executed
     log = (folder / LOG).read_text("utf-8", "replace").strip().splitlines() or ["no word of it"]
     for cell in codes:
