@@ -270,8 +270,8 @@ def test_a_target_that_is_half_in_the_shade_is_the_whole_of_it(tmp_path):
         return disc(image, sway[i], 22, (220, 120, 170)) * light[None, :, None]
 
     path = painted(tmp_path, texture(np.random.default_rng(6), 320, 180), draw, N)
-    _, error = followed(path, sway)
-    assert np.nanpercentile(error, 95) < 1.5
+    _, error = followed(path, sway, least=0.7)  # at the edge of the shade its outline is not sure
+    assert np.nanmax(error) < 1.5
 
 
 def test_a_view_of_another_size_or_off_the_way_is_known_less_well():
@@ -372,7 +372,7 @@ def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
     assert finished(views, CameraMotion(maps, errors), ())[0].warnings == ()
     larger = along(40, np.where(np.arange(40) < 20, 100.0, 300.0))
     (doubt,) = finished(larger, at_rest(40), ())[0].warnings
-    assert doubt.startswith("from frame 24 on, what is followed has another size at once")
+    assert doubt.startswith("from frame 22 on, what is followed has another size at once")
     few, _ = finished(along(9) + [None] * 191, at_rest(200), ())
     assert np.isnan(few.pixels).all()  # of a twentieth of the frames it makes none
     errors[16:] = np.inf
