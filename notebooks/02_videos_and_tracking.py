@@ -261,8 +261,7 @@ assert all(np.array_equal(a, b) for a, b in zip(clip, read_video(again), strict=
 # %% [markdown]
 # ## The tracker, step by step
 #
-# The paper tracks with YOLO-v8, a neural detector. For a camera at rest a classical method does, and it
-# is more exact. **First the background**: the median over frames spread through the clip. The target is
+# The paper tracks with YOLO-v8, a neural detector. A classical method does, too, and it is more exact. **First the background**: the median over frames spread through the clip. The target is
 # never long in one place, so that the median does not contain it.
 
 # %%
@@ -327,19 +326,20 @@ save_figure("videos_tracker_steps", fig, caption=caption, numbers={"coverage": c
 # grey pixels at the rim are what the sub-pixel accuracy comes from.*
 
 # %% [markdown]
-# `track` does this in a small window that follows the motion, smooths the difference if there is
-# noise, falls back to the whole frame when it loses the target, and in the end asks for each frame
-# whether the *whole* target was seen: if part of it is hidden, the centroid of the rest is not that
-# of the target. Then the frame gets NaN rather than a guess.
+# `track` does this near where the target's motion leads, smooths the difference if there is
+# noise, and in the end asks for each frame whether the *whole* target was seen: if part of it is hidden,
+# the centroid of the rest is not that of the target. Such a frame gets NaN, or, if only a few frames are
+# missing and their neighbours tell it as exactly, the place to which the motion leads.
 #
-# What tells a part from the whole is its **shape**. With $z=u+iv$ from the centroid, a rotation by
-# $\varphi$ only multiplies the complex moments
+# What tells a part from the whole is its **area** and its **skewness**: what is missing is missing on one
+# side. With $z=u+iv$ from the centroid, a rotation by $\varphi$ only multiplies the complex moments
 #
 # $$c_{pq}=\sum\alpha\,z^p\bar z^q$$
 #
-# by $e^{i(p-q)\varphi}$. So the magnitudes of $c_{11}$, $c_{20}$, $c_{21}$ and $c_{30}$, made
-# dimensionless, are the same in all whole views, however the target is turned and whatever its size,
-# whereas every part has others. The shape around which the views crowd is that of the target.
+# by $e^{i(p-q)\varphi}$. So the magnitudes of $c_{21}$ and $c_{30}$, made dimensionless, are the same in
+# all whole views, however the target is turned and whatever its size, whereas nearly every part has
+# others. Blur that is the same on both sides changes neither: cumulants of third order add, and those of
+# an even kernel are zero. The skewness around which the views crowd is that of the target.
 #
 # ## How exact it is
 #
@@ -396,8 +396,8 @@ save_figure("videos_tracker_errors", fig, caption=caption, numbers=errors)
 
 # %% [markdown]
 # *How often the tracked position is closer to the truth than a given distance: about a thousandth of
-# a pixel in clean videos, less than a tenth with noise. A post in the way costs frames, but the
-# others are as good as clean ones, even where the target lingers at its edge.*
+# a pixel in clean videos, less than a tenth with noise. A post in the way costs frames; the others are
+# good to a few tenths of a pixel, even where the target lingers at its edge.*
 
 # %%
 table = {row["videos"]: row for row in rows}
@@ -493,7 +493,7 @@ for name, ways in found.items():
         row[f"{way}: rms error (px)"] = np.sqrt(np.nanmean(off[way] ** 2))
     rows.append(row)
 loose = dict.fromkeys(["learned: rms error (px)", "auto: rms error (px)"], 0.2)
-save_table("detector_restless", rows, caption="Background model, learned detector, and `auto`.", tolerance=loose)
+save_table("detector_restless", rows, caption="The tracker told that the camera rests, the learned detector, and `auto`.", tolerance=loose)
 
 # %%
 seen = 90 if profile == "full" else 50  # of few frames `auto` may leave out the first and the last
@@ -515,10 +515,10 @@ caption = "Tracks before backgrounds that move, drawn where each frame shows the
 save_figure("detector_tracks", fig, caption=caption, numbers=dict(zip(names, flat, strict=True)))
 
 # %% [markdown]
-# *One frame of each restless video, with the track that `auto` found. Before a background at rest it is
-# the background model's. Elsewhere `track` first takes out how the background itself moves, then follows
-# what still moves from frame to frame: that is more exact than the learned detector, which sees one frame
-# at a time.*
+# *One frame of each restless video, with the track that `auto` found. `track` first takes out how the
+# background itself moves, then follows what still moves from frame to frame: that is more exact than the
+# learned detector, which sees one frame at a time. Told that the camera rests ("background"), it leaves
+# the camera's motion in.*
 
 # %% [markdown]
 # ## Gaps
@@ -562,7 +562,7 @@ save_figure("figure_S3", fig, caption=caption, numbers={"t": shot.t, "x": x, "tr
 #   <!-- by: max(literal) > 20 * min(literal); figure videos_frame_rate -->
 # * With the coverage of pixels, a classical tracker is good to a thousandth of a pixel on clean and to
 #   less than a tenth on noisy videos. It says NaN where the target is not seen whole, which its
-#   shape tells.
+#   area and skewness tell.
 #   <!-- by: figure videos_tracker; table[noisy]["rms error (px)"] < 0.01 + 1.5 * np.sqrt(noise_variance); table["a post in the way"]["largest error (px)"] < 0.5 -->
 # * Where the background moves, a learned detector finds the target in each frame by itself, to some
 #   tenths of a pixel; `auto` follows the motion and is more exact.

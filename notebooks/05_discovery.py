@@ -119,7 +119,7 @@ save_table("table_S1", rows, caption="The seven systems; initial conditions in t
 # ## From videos to paths
 #
 # One trial by hand, with fewer frames: film a system with three cameras against random backgrounds, forget the
-# calibration of cameras 2 and 3, and `observe`: track (here with the background model), learn the cameras, reconstruct.
+# calibration of cameras 2 and 3, and `observe`: track, learn the cameras, reconstruct.
 # Then find the law, and score it.
 
 # %%
@@ -148,7 +148,7 @@ films = sweep(run_film, [FilmTask(name, n, frames) for name in names for n in tr
 # looks in a square of 64 px around the target, along the grid of its anchors; what it says there is what it says in the whole
 # frame, to a tenth of a pixel or three.)
 #
-# The background model is more exact: its **sub-pixel** tracks are read to a thousandth of a pixel from clean and lossless
+# `track` is more exact: its **sub-pixel** tracks are read to a thousandth of a pixel from clean and lossless
 # videos. What a method makes of those is an upper bound, of no use in a comparison with the paper.
 #
 # All methods get the same paths in the reference frame, and the same 20 candidate terms:
@@ -294,18 +294,18 @@ for name, mine in ours.groupby("system", sort=False):
         "system": name, "exact": rate(mine.exact), "l2 (e-2)": significant(100 * mine.l2.median()),
         "worst coefficient (%)": significant(100 * mine.max_coefficient_error.median()),
         "detector (px)": significant(np.median(off)),
-        "background model (px)": significant(np.median([film.pixel_error for film in shots])),
+        "track (px)": significant(np.median([film.pixel_error for film in shots])),
         "seconds": shots[0].seconds + mine.seconds.iloc[0],
     })  # fmt: skip
 
 # %%
 caption = f"Gauss-Newton from the detector's whole pixels, and errors (rms) of both trackers; medians of {len(trials)} trials."
-loose = dict.fromkeys(["l2 (e-2)", "worst coefficient (%)", "detector (px)", "background model (px)"], 0.2)
+loose = dict.fromkeys(["l2 (e-2)", "worst coefficient (%)", "detector (px)", "track (px)"], 0.2)
 save_table("table_systems", rows, caption=caption, tolerance=loose)
 
 # %%
 assert max(max(film.pixel_error) for film in films) < 0.1
-assert all(row["detector (px)"] > 4 * row["background model (px)"] for row in rows)
+assert all(row["detector (px)"] > 4 * row["track (px)"] for row in rows)
 
 # %% [markdown]
 # ## The equations (Table S2)

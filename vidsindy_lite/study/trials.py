@@ -274,7 +274,7 @@ METHODS = ("Gauss-Newton", "spline-ADO", "PySINDy", "E-SINDy", "WeakSINDy", "Mod
 """`dynamics.discover`, the paper's own optimiser (`spline_ado`), and `baselines.BASELINES`."""
 SOURCES = ("detector", "sub-pixel", "path", "truth")
 """Where a path comes from, and what a condition is done to: tracks of the learned detector in
-whole pixels (the paper's regime), and tracks of the background model, before cameras are learned
+whole pixels (the paper's regime), and tracks of the film tracker, before cameras are learned
 from them; the path that the latter give; or the simulation."""
 
 LEAST = 1e-5
