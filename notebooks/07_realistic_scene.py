@@ -196,8 +196,7 @@ save_figure("fig_4a", fig, caption=caption, numbers=dict(zip(titles, tracks, str
 #
 # A tracker may lose what it cannot see. It must not invent it, and it should find it again. The target
 # may also be seen in part, through the leaves or beside the trunk; what can be seen then has another
-# centroid than the target, so these views are not trusted either; where a few of them lie between whole
-# ones, the motion tells where the target is.
+# centroid than the target, so these views are not trusted either.
 
 # %%
 views = [view for run in runs for view in run.views]

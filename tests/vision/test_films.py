@@ -171,7 +171,7 @@ def flight(folder, post, wall):
 @pytest.mark.parametrize(("post", "wall"), [(14, False), (0, True)], ids=["post", "wall"])
 def test_what_is_seen_in_part_is_where_its_motion_leads(tmp_path, post, wall):
     path = flight(tmp_path, post, wall)
-    assert np.nanmax(followed(path, TRUTH, HINT if wall else None)[1]) < 1
+    assert np.nanmax(followed(path, TRUTH, HINT)[1]) < 1
 
 
 def test_what_is_hidden_altogether_stays_a_gap(tmp_path):
@@ -270,8 +270,8 @@ def test_a_target_that_is_half_in_the_shade_is_the_whole_of_it(tmp_path):
         return disc(image, sway[i], 22, (220, 120, 170)) * light[None, :, None]
 
     path = painted(tmp_path, texture(np.random.default_rng(6), 320, 180), draw, N)
-    _, error = followed(path, sway, least=0.7)  # at the edge of the shade its outline is not sure
-    assert np.nanmax(error) < 1.5
+    assert np.nanmax(followed(path, sway, least=0.6)[1]) < 1.5
+    assert np.nanpercentile(followed(path, sway, around(sway, 44))[1], 95) < 1.5
 
 
 def test_a_view_of_another_size_or_off_the_way_is_known_less_well():

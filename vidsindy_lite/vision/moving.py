@@ -479,15 +479,17 @@ def _filled(
     found: Track, bound: float, film: Film, views: list[View | None], looks: Looks, ways: Ways,
     seed: tuple[int, Floats, Floats] | None,
 ) -> Track:  # fmt: skip
-    """A track with its gaps filled where a part of the target shows, and its motion leads.
+    """A track with its gaps filled: where its motion leads, or where it is by its looks.
 
-    That must be known as well as whole views are, to a `bound`; where they are known no better, its
-    looks will do, which are off by the same as in the frames around. What somebody points at is
-    wanted in any case.
+    Where only a part of it shows, its motion is surer, if that is known; else the looks, which are
+    off by the same as in the frames around. What somebody points at is wanted in any case; else
+    gaps are better, but where whole views are known no better than that, to a `bound`.
     """
+    vague = 2.0  # pixels to which looks tell a place
+    if seed is None and bound < vague:
+        return found
     n, k = len(found.pixels), film.factor
     pixels, confidence = found.pixels.copy(), found.confidence.copy()
-    vague = 2.0  # pixels to which looks tell a place
     alike = carry(film.motion.maps[:n], k * looks.box[:, :2] + (k - 1) / 2)
     side = k * np.sqrt(looks.box[:, 2:].prod(axis=1))
     reach = 0.6 * side + 2
@@ -509,16 +511,16 @@ def _filled(
                 np.polyfit(beside - i, pixels[beside], degree)[-1] for degree in (2, 3, 4)
             )
             off = max(np.linalg.norm(way - other), np.linalg.norm(finer - other))
-            known = off < (min(0.25 * size, bound) if seed is None else 0.25 * size)
+            known = off < (min(0.25 * size, vague) if seed is None else 0.25 * size)
             there = carry(film.motion.maps[i], view.centroid[None])[0] if view else np.inf
             part = np.linalg.norm(there - way) < 0.75 * size
             like = np.linalg.norm(alike[i] - way) < reach[i]
             if known and (part or (like and looks.fit[i] > 0.5 * usual)):
-                pixels[i], confidence[i] = way, _confidence(max(float(off), bound))
+                pixels[i], confidence[i] = way, _confidence(vague)
                 continue
         near = at[np.argsort(np.abs(at - i), kind="stable")[:15]]
         if seed is None:
-            if bound < vague or view is None or not (at[0] < i < at[-1]):
+            if view is None or not (at[0] < i < at[-1]):
                 continue
             # What hides a part of it draws its looks aside.
             if not view.inside or view.area < np.median([views[k].area for k in near]) / 1.5:

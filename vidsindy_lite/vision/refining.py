@@ -36,8 +36,8 @@ _UNEVEN = 0.12  # share by which a shadow may darken the colours of a pixel unli
 _WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
 _AROUND = 9  # views around one that say how large it should be
 _MOSTLY = 0.8  # share of the views that must show it whole
-_JOINED = 2.0  # factor by which the area grows at once where a target meets something like it
-_BESIDE = 5  # views before and after such a meeting, which show how large it was and is
+_JOINED = 2.0  # factor by which the area of something else differs
+_BESIDE = 5  # views before and after a change of size, which show how large it was and is
 _CORE = np.ones((5, 5), np.uint8)  # a rim of two pixels
 
 
@@ -255,7 +255,7 @@ def displaced(
     def bound() -> float:
         best = sound & (off <= np.quantile(off[sound], 0.75))
         rough, torn = (scatter(frames[best], x[best]) for x in (places, half * logs[:, None]))
-        return max(0.5, 6 * alike, 12 * rough, 4 * torn) if np.isfinite(rough) else 0.5
+        return max(0.75, 6 * alike, 12 * rough, 4 * torn) if np.isfinite(rough) else 0.75
 
     use = np.flatnonzero(sound & (off < bound()))
     if len(use) >= _AROUND:
@@ -281,8 +281,7 @@ def fitting(
     off, bound = displaced(frames, places, areas, skewness, inside)
     good = off < bound
     while (use := np.flatnonzero(good)).size >= 7:
-        told = [_leave_out(frames, places, i, use) for i in use.tolist()]
-        miss, unsure = np.array(told).T
+        miss, unsure = _left_out(frames, places, use)
         # Of its size, by which a view may be off the way.
         room = np.maximum(10 * max(float(np.median(miss)), 0.05), 1 + 0.3 * np.sqrt(areas[use]))
         over = miss / (room + unsure)
@@ -309,26 +308,29 @@ def swapped(frames: Ints, areas: Floats) -> int | None:
     return None
 
 
-def _leave_out(
-    frames: Floats | Ints, places: Floats, i: int, witnesses: Ints
-) -> tuple[float, float]:
-    """How far a place is from where the three on both sides of it say, and how unsure that is.
+def _left_out(frames: Ints, places: Floats, known: Ints) -> tuple[Floats, Floats]:
+    """How far places are from where the three on both sides say, and how unsure that is: (m,) each.
 
-    A quartic through these says it. Where a target turns within a few frames, or some of them are
-    missing, no polynomial is right, and a parabola says something else.
+    Of those that are `known`. A quartic through six says it. Where a target turns within a few
+    frames, or some of them are missing, no polynomial is right, and a parabola says something else.
     """
-    others = witnesses[witnesses != i]
-    first = min(max(int(np.searchsorted(others, i)) - 3, 0), max(len(others) - 6, 0))
-    others = others[first : first + 6]
-    t = frames[others] - frames[i]
-    if len(others) < 4 or max(t[-1], 0) - min(t[0], 0) > 15:
-        return 0.0, np.inf
+    m, count = len(known), min(6, len(known) - 1)
+    if count < 4:
+        return np.zeros(m), np.full(m, np.inf)
+    own = np.arange(m)[:, None]
+    beside = np.clip(own - 3, 0, m - 1 - count) + np.arange(count)
+    beside += beside >= own  # without itself
+    t = (frames[known][beside] - frames[known][:, None]).astype(float)
     quartic, parabola = (
-        np.polyfit(t, places[others], degree)[-1] for degree in (min(4, len(t) - 1), 2)
-    )
-    off, unsure = np.linalg.norm([quartic - places[i], quartic - parabola], axis=1)
-    beyond = t.min() > 0 or t.max() < 0
-    return float(off), float(unsure * (1 + beyond))
+        np.einsum("ij,ijk->ik", np.linalg.pinv(t[..., None] ** np.arange(degree + 1))[:, 0],
+                  places[known][beside])
+        for degree in (min(4, count - 1), 2)
+    )  # fmt: skip
+    first, last = t[:, 0], t[:, -1]
+    off = np.linalg.norm(quartic - places[known], axis=1)
+    unsure = np.linalg.norm(quartic - parabola, axis=1) * (1 + ((first > 0) | (last < 0)))
+    far = np.maximum(last, 0) - np.minimum(first, 0) > 15
+    return np.where(far, 0.0, off), np.where(far, np.inf, unsure)
 
 
 def roughness(frames: Ints, places: Floats, areas: Floats) -> tuple[Floats, float]:
@@ -340,9 +342,7 @@ def roughness(frames: Ints, places: Floats, areas: Floats) -> tuple[Floats, floa
     half, logs = np.sqrt(np.median(areas)) / 2, np.log(np.maximum(areas, 1))
     torn = half * scatter(frames, logs[:, None])
     odd = half * np.abs(logs - median_filter(logs, _AROUND, mode="nearest"))
-    every = np.arange(len(frames))
-    told = [_leave_out(frames, places, i, every) for i in range(len(frames))]
-    off, unsure = np.array(told).T
+    off, unsure = _left_out(frames, places, np.arange(len(frames)))
     worst = np.maximum(np.maximum(odd, off - unsure), torn if np.isfinite(torn) else 0.0)
     return np.hypot(scatter(frames, places), worst), torn
 

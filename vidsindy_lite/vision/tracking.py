@@ -60,14 +60,13 @@ def track(
     detector : {"auto", "background", "learned"} or path
         * "auto": the camera's motion and the light's are taken out, and of all that moves the
           plainest path is followed: something that travels, keeps its colour and turns gently.
-          The target may turn and change its size slowly; views of a part of it are left out. Gaps
-          of a few frames in which a part of it shows are filled where its motion leads.
+          The target may turn and change its size slowly; views of a part of it are left out.
         * "background": the same for a camera that is known to be at rest.
         * "learned": the package's own network, for backgrounds that move or change.
         * the name of a YOLO-v8 model exported to ONNX (see `OnnxDetector`).
     target : Hint, optional
-        Which of the things that move is the target, for "auto". It is then carried on beyond its
-        first and last whole view, too.
+        Which of the things that move is the target, for "auto". It is then carried on where a
+        part of it shows, and beyond its first and last whole view.
 
     Returns
     -------
