@@ -255,7 +255,7 @@ def displaced(
     def bound() -> float:
         best = sound & (off <= np.quantile(off[sound], 0.75))
         rough, torn = (scatter(frames[best], x[best]) for x in (places, half * logs[:, None]))
-        return max(0.75, 6 * alike, 12 * rough, 4 * torn) if np.isfinite(rough) else 0.75
+        return max(0.6, 6 * alike, 12 * rough, 4 * torn) if np.isfinite(rough) else 0.6
 
     use = np.flatnonzero(sound & (off < bound()))
     if len(use) >= _AROUND:
