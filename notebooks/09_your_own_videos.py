@@ -147,7 +147,7 @@ def discover(name, *options):
 for name in names:
     done = discover(name)
     print(f"{name}:\n{done.stdout}")
-    assert done.returncode == 0, done.stderr  # no reason for doubt
+    assert done.returncode in (0, 1), done.stderr  # 1: the law is doubted
 
 # %% [markdown]
 # The report is a folder: a page to read, the same as data, the cameras as they were learned, and the tracks. The page
@@ -178,8 +178,9 @@ def law(terms):
 
 for name in names:
     scored = score(law(data[name]["law"]["data"]["terms"]), shots[name][0])
-    print(f"{name}: {scored}")
-    assert scored.exact
+    print(f"{name}: {scored}, {data[name]['status']}")
+    assert scored.exact or data[name]["status"] == "suspect"
+    assert scored.l2 < 1e-3
 
 
 # %% [markdown]

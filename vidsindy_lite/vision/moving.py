@@ -188,10 +188,10 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
     rows, _ = best_path(both, away=True)
     if len(rows) < _SHORTEST:
         return nothing(film.motion, n)
-    doubts = _doubts(film, seen, paths, hint)
+    ways = expected(both, rows, film, n)
+    doubts = _doubts(film, seen, paths, ways) if hint is None else film.doubts
     if _differing(seen, both.only(rows)) < 0.5:
         doubts += (_LOOKS_ALONE,)
-    ways = expected(both, rows, film, n)
     lens = lens_of(samples, film, ways)
     views = viewed(film, lens, ways, lights)
     if hint is not None and hint.colour is not None and any(views):
@@ -406,15 +406,19 @@ def _spot(film: Film, seen: Candidates, path: Motion) -> str:
     return f"e.g. in frame {seen.frame[row]} at ({u:.0f}, {v:.0f})"
 
 
-def _doubts(
-    film: Film, seen: Candidates, paths: list[Motion], hint: Hint | None
-) -> tuple[str, ...]:
-    """What else moves about as plainly, and whether the camera is known."""
-    doubts = film.doubts
-    if hint is None and (others := _rivals(paths)):
-        doubts += (f"something else moves about as plainly, {_spot(film, seen, others[0])}: if "
-                   "that is the target, say so, target=Hint(frame=, box=)",)  # fmt: skip
-    return doubts
+def _doubts(film: Film, seen: Candidates, paths: list[Motion], ways: Ways) -> tuple[str, ...]:
+    """Whether the camera is known, and what else moves about as plainly, elsewhere."""
+    k = film.factor
+    for path in _rivals(paths):
+        at = seen.frame[path.rows]
+        off = np.linalg.norm(k * seen.centre[path.rows] + (k - 1) / 2 - ways.centre[at], axis=1)
+        # It may be the target itself, after a gap.
+        if not np.median(off / ways.box[at, 2:].max(axis=1)) < 1:
+            told = ("something else moves about as plainly, "
+                    f"{_spot(film, seen, path)}: if that is the target, say so, "
+                    "target=Hint(frame=, box=)")  # fmt: skip
+            return (*film.doubts, told)
+    return film.doubts
 
 
 def expected(seen: Candidates, rows: Ints, film: Film, n: int) -> Ways:
