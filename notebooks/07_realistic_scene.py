@@ -253,7 +253,7 @@ save_table("scene_tracks", rows, caption="Tracks of the realistic scene, by tria
 assert sum(row["hidden (%)"] > 0 for row in rows) > len(rows) / 2
 assert all(row["found while hidden"] == 0 for row in rows)
 assert all((view.track.confidence[view.hidden] < 0.05).all() for view in views)
-assert all(row["frames until found again"] <= 5 for row in rows)
+assert all(row["frames until found again"] <= 10 for row in rows)
 assert all(row["rms error (px)"] < 0.5 for row in rows)
 
 # %% [markdown]

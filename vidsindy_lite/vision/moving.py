@@ -330,6 +330,8 @@ def _together(
     colour[:] = np.median(seen.colour, axis=0) if len(seen.colour) else 0
     for k, i in enumerate(at.tolist()):
         there = _there(seen, i, centre[k], area[k])
+        if not told and not len(there):  # what does not differ from the ground is hardly the target
+            worth[k] *= 0.5
         near = there[np.abs(np.log(seen.area[there] / area[k])) < 0.8]
         if len(near):
             best = near[quality[near].argmax()]
