@@ -369,7 +369,7 @@ for name, folder in folders.items():
     raw, t = [vision.track(folder / f"{p}.avi").pixels for p in "abc"], shots[name][1]
     rigs = [measured(name, trial) for trial in range(4 if full else 1)]
     bare = [Rig([replace(camera, **unsaid) for camera in rig.cameras]) for rig in rigs]
-    exact[name] = [observe_tracks(raw, Rig.load(folder / "rig.toml"), t)]
+    exact[name] = [discover_from_tracks(raw, Rig.load(folder / "rig.toml"), t)]
     stated[name] = [discover_from_tracks(raw, rig, t) for rig in rigs]
     taken[name] = [observe_tracks(raw, rig, t) for rig in bare]
     off = [np.abs(found.lags.frames - (0, late, 0)).max() for found in stated[name]]
