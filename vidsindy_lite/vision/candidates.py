@@ -384,9 +384,13 @@ def best_path(seen: Candidates, *, away: bool = False) -> tuple[Ints, float]:
     value, before = seen.quality - 0.2, np.full(len(size), -1)
     speed, bent = np.full((2, len(size), 2), np.nan)
     bounds = np.searchsorted(seen.frame, np.arange(seen.frame[-1] + 2))
+    older, passed = np.zeros(0, int), 0
     for i in np.unique(seen.frame):
         new, recent = np.arange(bounds[i], bounds[i + 1]), bounds[max(i - GAP, 0)]
-        older = np.argsort(-value[:recent], kind="stable")[: _KEPT * away]
+        if away:
+            older = np.concatenate([older, np.arange(passed, recent)])
+            older = older[np.lexsort((older, -value[older]))][:_KEPT]
+            passed = recent
         old = np.concatenate([older, np.arange(recent, bounds[i])])
         if not len(old):
             continue

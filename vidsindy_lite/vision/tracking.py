@@ -85,7 +85,10 @@ def track(
         check_instance("target", target, Hint)
         if detector != "auto":
             raise ValueError(f"target: may be given for detector='auto', got {shown(detector)}")
-    found = _track(path, detector, target)
+    if detector in ("auto", "background"):
+        found = follow(path, target, rests=detector == "background")
+    else:
+        found = _link_detections(path, detector)
     lacking, stated = found.warnings + _lost(found), video_info(path).frames
     if target is not None and target.colour is not None and not _seen(found):
         lacking += (f"nothing was found of the colour {as_written(target.colour)} as told",)
@@ -93,13 +96,6 @@ def track(
         lacking += (f"{len(found.pixels)} of its {stated} frames can be read: it is cut off",)
     doubts = tuple(f"{Path(path).name}: {doubt}" for doubt in lacking)
     return replace(found, warnings=doubts)
-
-
-def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | None) -> Track:
-    """The track, its doubts without the name of the file."""
-    if detector in ("auto", "background"):
-        return follow(path, target, rests=detector == "background")
-    return _link_detections(path, detector)
 
 
 def _seen(found: Track) -> float:
