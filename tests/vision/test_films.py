@@ -385,7 +385,7 @@ def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
 
 @pytest.mark.parametrize(("part", "told"), [(0.99, False), (0.8, True)])
 def test_an_outline_that_changes_from_frame_to_frame_is_told(part, told):
-    areas = 1e4 * np.where(np.random.default_rng(0).random(40) < 0.5, part, 1)
+    areas = 1e4 * np.random.default_rng(0).uniform(part, 1, 40)
     found, _ = finished(along(40, areas, 50.0), at_rest(40), ())
     assert any("outline of the target" in doubt for doubt in found.warnings) == told
     assert (np.median(found.confidence) < np.exp(-2 / 3)) == told

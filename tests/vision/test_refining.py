@@ -116,8 +116,8 @@ def left_out(frames, places, areas, skewness, inside=ALL):
 
 
 def test_views_of_another_size_than_those_around_them_do_not_fit():
-    areas = np.linspace(100, 250, 30)  # a target that comes closer
-    areas[[7, 12, 23, 29]] *= [1.04, 1.6, 1 / 1.2, 0.5]
+    areas = np.geomspace(100, 250, 30)  # a target that comes closer
+    areas[[7, 12, 23, 29]] *= [1.004, 1.6, 1 / 1.2, 0.5]
     assert left_out(FRAMES, WAY, areas, EVEN[:30]) == [12, 23, 29]
     border = ALL.copy()
     border[4] = False
@@ -135,7 +135,7 @@ def test_the_rougher_a_path_the_more_may_outlines_differ(noise):
     areas, inside = np.full(60, 400.0), np.full(60, True)
     good, bound = fitting(SIXTY, way, areas, skewness, inside)
     assert good.all() if noise > 0.1 else np.flatnonzero(~good).tolist() == [*range(20, 26)]
-    assert bound == pytest.approx(max(0.6, 12 * noise), rel=0.3)
+    assert bound == pytest.approx(max(0.05, 12 * noise), rel=0.3)
     skewness[:] = np.nan  # before ground of its colour nothing is known of its outline
     assert fitting(SIXTY, way, areas, skewness, inside)[0].all()
 

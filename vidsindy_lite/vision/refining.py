@@ -233,29 +233,27 @@ def displaced(
 ) -> tuple[Floats, float]:
     """Pixels by which views (n,) are off the target, as their outlines say, and a bound to them.
 
-    The usual skewness is the commonest one: whole views, at least a quarter of all, lie close
-    around it; of a view without any only the area counts. The usual area is that of the views
-    around. By no more than the bound whole views may seem to be off: that is how their outlines
+    The usual skewness is the commonest one: whole views, at least a third of all, lie close around
+    it; of a view without any only the area counts. The usual area is that of the views around. By
+    no more than the bound whole views may seem to be off: that is how the most alike of them
     differ, and how their path scatters.
     """
     if not inside.any():
         return np.full(len(areas), np.inf), 0.0
     half, logs = np.sqrt(np.median(areas[inside])) / 2, np.log(np.maximum(areas, 1e-3))
-    sound, quarter = inside & np.isfinite(skewness[:, 0]), inside.sum() // 4
-    off, alike = np.zeros(len(areas)), 0.0
-    if sound.sum() <= quarter:
+    sound, third = inside & np.isfinite(skewness[:, 0]), inside.sum() // 3
+    off = np.zeros(len(areas))
+    if sound.sum() <= third:
         sound = inside
     else:
         some = skewness[sound][:: 1 + sound.sum() // 200]
         apart = cdist(some, skewness[sound])
-        commonest = np.partition(apart, quarter, axis=1)[:, quarter].argmin()
-        off[sound] = half * apart[commonest]
-        alike = float(np.partition(off[sound], quarter)[quarter])
+        off[sound] = half * apart[np.partition(apart, third, axis=1)[:, third].argmin()]
 
     def bound() -> float:
         best = sound & (off <= np.quantile(off[sound], 0.75))
-        rough, torn = (scatter(frames[best], x[best]) for x in (places, half * logs[:, None]))
-        return max(0.6, 6 * alike, 12 * rough, 4 * torn) if np.isfinite(rough) else 0.6
+        alike, rough = np.partition(off[sound], third)[third], scatter(frames[best], places[best])
+        return float(max(0.05, 8 * alike, 12 * rough if np.isfinite(rough) else 0.0))
 
     use = np.flatnonzero(sound & (off < bound()))
     if len(use) >= _AROUND:
@@ -265,9 +263,12 @@ def displaced(
 
 
 def _trend(frames: Ints, at: Ints, values: Floats) -> Floats:
-    """What the values around each frame say of it: the line of Theil and Sen through nine."""
-    first = np.clip(np.searchsorted(at, frames) - _AROUND // 2, 0, len(at) - _AROUND)
-    around = first[:, None] + np.arange(_AROUND)
+    """What the nine nearest values say of each frame: the line of Theil and Sen through them."""
+    first = np.searchsorted(at, frames)[:, None] - np.arange(_AROUND)
+    first = np.clip(first, 0, len(at) - _AROUND)
+    reach = np.maximum(frames[:, None] - at[first], at[first + _AROUND - 1] - frames[:, None])
+    nearest = np.take_along_axis(first, reach.argmin(axis=1)[:, None], axis=1)
+    around = nearest + np.arange(_AROUND)
     t, y = at[around] - frames[:, None], values[around]
     i, j = np.triu_indices(_AROUND, 1)
     slope = np.median((y[:, j] - y[:, i]) / (t[:, j] - t[:, i]), axis=1)
