@@ -472,7 +472,11 @@ def finished(
     pixels[at[good]] = steady[good]
     rough, torn = roughness(at[good], steady[good], areas[good])
     errors[at[good]] = np.hypot(rough, motion.errors[at[good]])
-    if np.isfinite(torn) and torn > max(LOOSE, 0.02 * np.sqrt(np.median(areas[good]))):
+    side = np.sqrt(np.median(areas[good]))
+    if bound > side / 3:  # of half of it the outline is off by that
+        doubts += ("the target's outline differs so much that a part of it cannot be told from the "
+                   "whole",)  # fmt: skip
+    elif np.isfinite(torn) and torn > max(LOOSE, 0.02 * side):
         doubts += (f"the outline of the target changes from frame to frame: its place is known to "
                    f"{torn:.1f} px only",)  # fmt: skip
     if np.median(motion.errors[at[good]]) > LOOSE:
