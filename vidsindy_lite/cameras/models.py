@@ -56,7 +56,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats
 from ..checks import (
     check_array,
     check_image_size,
@@ -529,10 +529,10 @@ def undistorted(points: Floats, coefficients: Floats) -> Floats:
     if not len(points):  # which OpenCV refuses
         return points
     enough = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, _UNBENT, _SETTLED)
-    eye = np.eye(3)
-    found = cv2.undistortPoints(points[:, None], eye, coefficients, criteria=enough)[:, 0]
+    ideal = cv2.undistortPoints(points[:, None], np.eye(3), coefficients, criteria=enough)
+    found = np.asarray(ideal[:, 0], float)
     found[~(np.abs(distorted(found, coefficients) - points).max(axis=1) < 1e-7)] = np.nan
-    return np.asarray(found, float)
+    return found
 
 
 def distorted(points: Floats, coefficients: Floats) -> Floats:
@@ -820,20 +820,26 @@ def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floa
     seen = np.where(visible[..., None], seen, 0)
 
     left, right = _stacked(*_lines(matrices, scales[:, None] * seen), visible)
+    x, part = _least_squares(left, right), np.ones(len(left))
     crossing = (np.linalg.svd(left, compute_uv=False) > PARALLEL).sum(axis=1) == 3
-    x, ended = np.full((len(crossing), 3), np.nan), np.ones(len(crossing), bool)
-    seen, visible = seen[crossing], visible[crossing]
-
-    def look(point: Floats, frames: Ints) -> tuple[Floats, Floats]:
-        slope, missed = _reprojection(matrices, scales, seen[frames], point)
-        return _stacked(slope, missed, visible[frames])
-
-    start = _least_squares(left[crossing], right[crossing])
-    point, settled = _gauss_newton(look, start)
-    depth = point @ matrices[:, 2, :3].T + matrices[:, 2, 3]
-    point[(visible & (depth <= 0)).any(axis=1)] = np.nan
-    x[crossing], ended[crossing] = point, settled
-    return x, ended
+    slope, off = _reprojection(matrices, scales, seen, visible, x)
+    active = np.flatnonzero(crossing)
+    for _ in range(_STEPS):
+        step = part[active, None] * _least_squares(slope[active], off[active])
+        tried = x[active] + step
+        new_slope, new_off = _reprojection(matrices, scales, seen[active], visible[active], tried)
+        error, new_error = np.sum(off[active] ** 2, axis=1), np.sum(new_off**2, axis=1)
+        moved = np.abs(slope[active] @ step[..., None]).max(axis=(1, 2), initial=0)
+        lower = new_error <= (1 + 1e-12) * error + SETTLED**2  # or equal, but for rounding
+        part[active] = np.where(lower, 1, part[active] / 2)  # of a step that leads uphill
+        taken = active[lower]
+        x[taken], slope[taken], off[taken] = tried[lower], new_slope[lower], new_off[lower]
+        active = active[~(moved <= SETTLED)]
+        if not active.size:
+            break
+    depth = x @ matrices[:, 2, :3].T + matrices[:, 2, 3]
+    x[(visible & (depth <= 0)).any(axis=1) | ~crossing] = np.nan
+    return x, ~np.isin(np.arange(len(x)), active)
 
 
 def epipolar_lines(known: Camera, pixels: Floats, unknown: Camera) -> tuple[Floats, Floats]:
@@ -906,13 +912,14 @@ def _lines(matrices: Floats, plane: Floats) -> tuple[Floats, Floats]:
 
 
 def _reprojection(
-    matrices: Floats, scales: Floats, turned: Floats, x: Floats
+    matrices: Floats, scales: Floats, turned: Floats, visible: Bools, x: Floats
 ) -> tuple[Floats, Floats]:
-    """Slope of the T x_c at which points are seen, (n, m, 2, 3), and how far it is off."""
-    image = np.moveaxis(x @ matrices[:, :, :3].swapaxes(1, 2), 0, 1) + matrices[:, :, 3]
-    plane, depth = image[..., :2] / image[..., 2:], image[..., 2, None, None]
-    slope, _ = _lines(matrices, plane)
-    return slope / (scales[:, None, None] * depth), turned - plane / scales[:, None]
+    """Slopes of the T x_c at which points are seen, (n, 2 m, 3), and how far these are off."""
+    with np.errstate(all="ignore"):  # lines that hardly cross may send a point far away
+        image = np.moveaxis(x @ matrices[:, :, :3].swapaxes(1, 2), 0, 1) + matrices[:, :, 3]
+        plane, depth = image[..., :2] / image[..., 2:], image[..., 2, None, None]
+        slope = _lines(matrices, plane)[0] / (scales[:, None, None] * depth)
+    return _stacked(slope, turned - plane / scales[:, None], visible)
 
 
 def _stacked(left: Floats, right: Floats, visible: Bools) -> tuple[Floats, Floats]:
@@ -920,33 +927,6 @@ def _stacked(left: Floats, right: Floats, visible: Bools) -> tuple[Floats, Float
     rows = 2 * visible.shape[1]
     left = np.where(visible[..., None, None], left, 0).reshape(-1, rows, 3)
     return left, np.where(visible[..., None], right, 0).reshape(-1, rows)
-
-
-def _gauss_newton(
-    look: Callable[[Floats, Ints], tuple[Floats, Floats]], start: Floats
-) -> tuple[Floats, Bools]:
-    """Points of the least squared misses, each searched by itself, and which of them settled.
-
-    `look(points, frames)` gives the slopes, (k, m, 3), and the misses, (k, m), pixels.
-    """
-    point, active = start.copy(), np.arange(len(start))
-    part = np.ones(len(start))  # of the step, halved where the whole one leads uphill
-    slope, missed = look(point, active)
-    for _ in range(_STEPS):
-        step = part[active, None] * _least_squares(slope[active], missed[active])
-        with np.errstate(all="ignore"):  # lines that hardly cross may send a point far away
-            new_slope, new_missed = look(point[active] + step, active)
-            new_error, error = np.sum(new_missed**2, axis=1), np.sum(missed[active] ** 2, axis=1)
-        moved = np.abs(slope[active] @ step[..., None]).max(axis=(1, 2), initial=0)
-        lower = new_error <= (1 + 1e-12) * error + SETTLED**2  # or equal, but for rounding
-        part[active] = np.where(lower, 1, part[active] / 2)
-        taken = active[lower]
-        point[taken] += step[lower]
-        slope[taken], missed[taken] = new_slope[lower], new_missed[lower]
-        active = active[~(moved <= SETTLED)]
-        if not active.size:
-            break
-    return point, ~np.isin(np.arange(len(start)), active)
 
 
 def _least_squares(left: Floats, right: Floats) -> Floats:
