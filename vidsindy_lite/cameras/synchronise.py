@@ -34,7 +34,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import combinations, product
 
 import numpy as np
@@ -43,7 +42,7 @@ from tqdm import tqdm
 
 from ..arrays import Floats, Ints
 from ..progress import bar
-from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, known_to
+from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, known_to, persistence
 from .calibrate import check_learnable, closed_form
 from .clocks import INSTANTS, OVERLAP, Footage, Lags, check_lags, dips, list_lags
 from .models import TRIMMED, Camera, at_once, epipolar_lines, epipolar_rows, missed, trimmed
@@ -136,11 +135,7 @@ def agrees(fit: Adjustment) -> bool:
 
     Noise of the tracks, however large, is no reason to look for other lags.
     """
-    missed = fit.misses[fit.used]
-    now, then = missed[:-1], missed[1:]
-    both = np.isfinite(now) & np.isfinite(then)
-    square = max(float(np.sum((now**2)[both])), 1e-300)
-    alike = max(float(np.sum((now * then)[both])) / square, 0.0)
+    alike = max(persistence(fit.misses[fit.used]), 0.0)
     misfit = score(fit) * np.sqrt(alike / _PERSISTENT)
     return bool(alike <= _PERSISTENT and misfit <= DISAGREEMENT and score(fit) <= GROSS)
 
@@ -245,8 +240,7 @@ def learn_lags(
     footage = Footage.of(tracks, None, rates, clocks)
     rig = posed(replace(footage, lags=first).aligned, rig, synchronous=False)
     with bar(progress, "synchronise", unit="fit") as shown:
-        found = _learned(_Videos.of(footage, rig, shown), first)
-    return found if clocks is None else replace(found, clocks=footage.clocks)
+        return replace(_learned(_Videos.of(footage, rig, shown), first), clocks=footage.uneven)
 
 
 @dataclass(frozen=True, eq=False)
@@ -489,24 +483,19 @@ def _near(footage: Footage, rig: Rig, start: Floats) -> list[Adjustment]:
     return _fits(footage, rig, start, _paired(footage, rig.cameras)[1])
 
 
-def find_mistake(
-    tracks: Sequence[Floats],
-    rig: Rig,
-    rates: Floats,
-    clocks: Sequence[Floats] | None,
-    start: Floats,
-    names: Sequence[str],
-) -> Mistake | None:
+def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | None:
     """The one mistake without which the views agree; None if they do anyway, or with none.
 
     Parameters
     ----------
-    tracks, rig, rates, clocks, start
+    given : Footage
+        Its lags are tried first.
+    rig : Rig
         See `learn_lags`.
     names : sequence of str
         What the videos are called.
     """
-    given, found = Footage.of(tracks, None, rates, clocks), list[Mistake]()
+    start, found = given.lags, list[Mistake]()
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
         begun = _near(given, rig, start)
         left = min(map(_worst, begun), default=np.inf)
@@ -514,7 +503,7 @@ def find_mistake(
             return None
         # Whole views are not mistaken where most frames agree.
         most = min((fit.left() for fit in begun), default=np.inf) <= 2 * DISAGREEMENT
-        for kind in (partial(_dropped, start=start), *(() if most else (_whole,))):
+        for kind in (_dropped,) if most else (_dropped, _whole):
             if found and found[-1].lags.residual <= DISAGREEMENT:
                 break
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
@@ -590,7 +579,7 @@ def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
             yield moved, order.tolist()
 
 
-def _dropped(given: Footage, rig: Rig, names: Sequence[str], start: Floats) -> Iterator[Mistake]:
+def _dropped(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
     """Videos of which frames were dropped, with the clocks by which they agree all the time."""
     length, ways = given.lengths.min(), []
     for low in _PARTS:  # in one of them none is dropped, maybe: its cameras tell when
@@ -601,7 +590,7 @@ def _dropped(given: Footage, rig: Rig, names: Sequence[str], start: Floats) -> I
         )
         if min(map(len, tracks)) > 1:
             part = Footage.of(tracks, None, given.rates, clocks)
-            ways += [_jumped(given, given, fit) for fit in _near(part, rig, start)]
+            ways += [_jumped(given, given, fit) for fit in _near(part, rig, given.lags)]
     for _ in range(3):  # as what is mended tells the cameras, and these the rest
         if not ways:
             return
