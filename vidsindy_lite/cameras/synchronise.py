@@ -399,15 +399,14 @@ def _told(videos: _Videos, fit: Adjustment, first: Floats) -> Lags:
     # Lags are those of the first instant, those of the fit of the middle.
     moved = np.hstack((np.eye(count), -np.eye(count)[:, drifting[1:]] * fit.footage.middle
                        / fit.footage.span))  # fmt: skip
-    information = np.linalg.pinv(moved @ together @ moved.T, hermitian=True)
-    errors = np.sqrt(np.concatenate(([0.0], np.diag(np.linalg.pinv(information, hermitian=True)))))
+    variance = moved @ together @ moved.T
+    errors = np.sqrt(np.append(0.0, np.diag(variance)))
     # Schwarz's criterion: a fraction is one more unknown per video.
     rounded = np.rint(lags) + 0.0  # and not -0
     beside = (rounded - lags)[1:]
-    if beside @ information @ beside < count * np.log(fit.used.sum()):
+    if beside @ np.linalg.pinv(variance) @ beside < count * np.log(fit.used.sum()):
         lags = rounded
-    blurred = np.flatnonzero(errors > BLURRED)
-    warnings = [_blurred(int(i), lags) for i in blurred]
+    warnings = [_blurred(i, lags) for i in range(len(lags)) if errors[i] > BLURRED]
     if not fit.settled:
         warnings.append(
             f"the search for the lags of the videos did not converge in {fit.steps} steps: give "
@@ -449,9 +448,9 @@ class Mistake:
 
     what: str
     footage: Footage
-    lags: Lags = Lags(np.zeros(0), np.zeros(0), np.zeros(0), np.inf)
-    before: float = np.inf
-    alike: tuple[str, ...] = ()
+    lags: Lags
+    before: float
+    alike: tuple[str, ...]
 
     @property
     def text(self) -> str:
@@ -508,24 +507,25 @@ def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | No
                 break
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
             # none.
-            each = kind(given, rig, names)
-            ranked = [(*_paired(one.footage, rig.cameras), one) for one in each]
-            ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
-            tried = [
-                (_worst(fit), fit, one)
-                for _, best, one in ranked
-                for fit in _fits(one.footage, rig, start, best)
+            ranked = [
+                (*_paired(mended, rig.cameras), what, mended)
+                for what, mended in kind(given, rig, names)
             ]
-            for now, fit, one in sorted(tried, key=lambda one: one[0]):
+            tried = [
+                (_worst(fit), fit, what, mended)
+                for _, best, what, mended in sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
+                for fit in _fits(mended, rig, start, best)
+            ]
+            for now, fit, what, mended in sorted(tried, key=lambda one: one[0]):
                 # Times by which it has to mend the disagreement of all views together.
                 if now > GROSS or 3.0 * now >= left:
                     break
-                mended, lags = one.footage, fit.footage.lags
+                lags = fit.footage.lags
                 told = learn_lags(mended.tracks, rig, mended.rates, lags, mended.clocks)
                 if told.agree and told.residual <= 2 * DISAGREEMENT:
-                    others = [o.what for n, _, o in tried if n <= ALIKE * max(now, FINE)]
-                    alike = tuple(dict.fromkeys(o for o in others if o != one.what))
-                    found.append(replace(one, lags=told, before=left, alike=alike))
+                    others = [o for n, _, o, _ in tried if n <= ALIKE * max(now, FINE)]
+                    alike = tuple(dict.fromkeys(o for o in others if o != what))
+                    found.append(Mistake(what, mended, told, left, alike))
                     break
     return min(found, key=lambda one: one.lags.residual, default=None)
 
@@ -537,7 +537,7 @@ def _worst(fit: Adjustment) -> float:
     return max(trimmed(view, 0.5) for view in views)
 
 
-def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
+def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str, Footage]]:
     """All that change whole views: their order, their axes, and rates taken for each other."""
     count, sizes = len(names), [camera.image_size for camera in rig.cameras]
     for moved, order in _orders(count):
@@ -545,7 +545,7 @@ def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
             tracks, clocks = ([one[i] for i in order] for one in (given.tracks, given.clocks))
             how = "swapped" if len(moved) == 2 else "in another order than their cameras"
             what = f"{' and '.join(names[i] for i in moved)} {how}"
-            yield Mistake(what, Footage.of(tracks, None, given.rates[order], clocks))
+            yield what, Footage.of(tracks, None, given.rates[order], clocks)
     known = {i for i, camera in enumerate(rig.cameras) if camera.is_calibrated}
     for views in (*({i} for i in range(count)), {*range(count)}):
         told, ways = "all views", ["mirrored", "with v counted upwards"]
@@ -563,11 +563,11 @@ def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
                 if i in views else track
                 for i, (track, size) in enumerate(zip(given.tracks, sizes, strict=True))
             ]  # fmt: skip
-            yield Mistake(f"{told} {how}", Footage.of(tracks, None, given.rates, given.clocks))
+            yield f"{told} {how}", Footage.of(tracks, None, given.rates, given.clocks)
     for i, (real, stated) in product(range(count), RATES):
         rates = np.where(np.arange(count) == i, real / stated, 1.0) * given.rates
         what = f"{names[i]} with {real} frames for {stated} that are supposed"
-        yield Mistake(what, replace(given, rates=rates / rates[0]))
+        yield what, replace(given, rates=rates / rates[0])
 
 
 def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
@@ -579,7 +579,7 @@ def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
             yield moved, order.tolist()
 
 
-def _dropped(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
+def _dropped(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str, Footage]]:
     """Videos of which frames were dropped, with the clocks by which they agree all the time."""
     length, ways = given.lengths.min(), []
     for low in _PARTS:  # in one of them none is dropped, maybe: its cameras tell when
@@ -604,7 +604,7 @@ def _dropped(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[Mistake
     ]
     if told:  # of several places one may have taken a few frames of another
         about = "about " if len(told) > 1 else ""
-        yield Mistake(", ".join(about + one for one in told), found)
+        yield ", ".join(about + one for one in told), found
 
 
 def _jumped(given: Footage, mended: Footage, fit: Adjustment) -> tuple[float, Floats, Footage]:
