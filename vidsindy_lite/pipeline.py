@@ -740,12 +740,10 @@ def _times(
     if t is not None:
         return t, []
     if fps is None:
-        stated = []
         for track in read:
             if track.t is None:
                 raise ValueError(f"t: must be given, or fps, as {track.name} states no times")
-            stated.append(track.t)
-        return stated, []
+        return [track.t for track in read if track.t is not None], []
     given, doubts = check_positive("fps", fps), []
     for track in read:
         if track.t is not None and len(track.t) > 1:

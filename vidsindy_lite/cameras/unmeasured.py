@@ -47,7 +47,6 @@ _FEWEST = 8  # frames in common of a pair
 _VIEWS = np.geomspace(2, 90, 15)  # degrees across an image: what lenses have
 _STARTS, _LAGS = 4, 10  # of all, from which a search begins
 _STEPS = 30  # of each such search
-_WIDE = 0.01  # OpenCV refuses points that are close together, in whatever unit
 _FLAT = 1e-3  # of the largest axis: what rounding leaves of a motion in a plane
 
 _EITHER_HAND = (
@@ -161,8 +160,8 @@ def _around(
     _, turn, shift, front, homogeneous = cv2.recoverPose(
         essential, *seen, centre, distanceThresh=50.0, mask=mask
     )
-    points, there = np.full((len(rays[0]), 3), np.nan), np.flatnonzero(both)[front[:, 0] > 0]
-    points[there] = (homogeneous[:3] / homogeneous[3]).T[front[:, 0] > 0]
+    points = np.full((len(rays[0]), 3), np.nan)
+    points[both] = np.where(front > 0, (homogeneous[:3] / homogeneous[3]).T, np.nan)
     poses: dict[int, _Pose] = {
         i: (np.eye(3), np.zeros(3)), j: (np.asarray(turn), np.asarray(shift)[:, 0])
     }  # fmt: skip
@@ -170,17 +169,16 @@ def _around(
         told = np.isfinite(points).all(axis=1) & np.isfinite(rays[k]).all(axis=1)
         if told.sum() < _FEWEST:
             return
-        wide = _WIDE * float(np.ptp(points[told], axis=0).max())
         try:
             done, axis, place, _ = cv2.solvePnPRansac(
-                points[told] / wide, rays[k][told], centre, None, flags=cv2.SOLVEPNP_SQPNP,
+                points[told], rays[k][told], centre, None, flags=cv2.SOLVEPNP_SQPNP,
                 reprojectionError=3 * GROSS / cameras[k].focal_length,
             )  # fmt: skip
         except cv2.error:  # points of one draw lie too close together
             return
         if not done:
             return
-        poses[k] = np.asarray(cv2.Rodrigues(axis)[0]), wide * np.asarray(place)[:, 0]
+        poses[k] = np.asarray(cv2.Rodrigues(axis)[0]), np.asarray(place)[:, 0]
     yield [poses[k] for k in sorted(poses)]
 
 
