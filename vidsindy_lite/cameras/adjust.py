@@ -38,7 +38,7 @@ cause, the change c of cameras that one step finds with it free is compared with
 
     T = c' S^-1 c,      S as above, of the residuals that the cause leaves.
 
-A cause that stands out is tried: cameras and path are adjusted with it free.
+With the cause that stands out most free, cameras and path are adjusted.
 
 Newey and West 1987, Econometrica 55; Andrews 1991, Econometrica 59 (the number of frames);
 Triggs et al. 2000, "Bundle adjustment: a modern synthesis".
@@ -70,7 +70,7 @@ from .models import (
     intersect,
     trimmed,
 )
-from .rig import FINE, GROSS, Rig, decimals, disagreement, residuals
+from .rig import FINE, GROSS, Rig, decimals, residuals
 
 PARTS = {
     "normal": [0, 1],
@@ -488,13 +488,6 @@ class Cause:
         """`disagreement` of the worst camera of those found, pixels."""
         return self.found.left()
 
-    @property
-    def price(self) -> float:
-        """Schwarz's criterion."""
-        used = np.isfinite(self.found.misses)
-        left = max(float(np.sum(self.found.weighed[0][used] ** 2)), ROUNDING)
-        return float(used.sum() * np.log(left) + self.freed.sum() * np.log(used.sum()))
-
     def text(self, names: Sequence[str]) -> str:
         """What would explain the residuals best, with its value."""
         i = self.cameras[0]
@@ -528,20 +521,19 @@ def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Cause | None:
         Before and after `learn_cameras`.
     """
     errors = np.array([known_to(camera) for camera in given.cameras])
-    far = smooth(tracks, learned) and max(disagreement(tracks, learned)) > GROSS
     footage, start = Footage.of(tracks), learned.cameras
     near = adjust(footage, start, np.where(errors > 0, errors, np.inf), most=0)
-    causes = [(what, freed) for what, freed in _causes(near) if (freed & (errors == 0)).any()]
-    told = [_evidence(near, errors[near.free] > 0, freed[near.free]) for _, freed in causes]
     # Where views are far apart, and no noise makes it, no test is needed.
-    rank = [explained if far else evidence for evidence, explained in told]
-    # The five that stand out most.
-    likely = [causes[k] for k in np.argsort(rank)[::-1][:5] if rank[k] > (0 if far else 1)]
-    tried = [
-        Cause(what, freed, adjust(footage, start, np.where(freed, np.inf, errors)))
-        for what, freed in likely
+    far = near.left() > GROSS and smooth(tracks, learned)
+    ranked = [
+        (_evidence(near, errors[near.free] > 0, freed[near.free], far), what, freed)
+        for what, freed in _causes(near)
+        if (freed & (errors == 0)).any()
     ]
-    return min(tried, key=lambda cause: cause.price, default=None)
+    most, what, freed = max(ranked, key=lambda one: one[0], default=(0.0, "", errors > 0))
+    if most == 0:
+        return None
+    return Cause(what, freed, adjust(footage, start, np.where(freed, np.inf, errors)))
 
 
 def smooth(tracks: Sequence[Floats], learned: Rig) -> bool:
@@ -576,8 +568,11 @@ def _causes(near: Adjustment) -> Iterator[tuple[str, Bools]]:
             yield what, freed & ~senseless
 
 
-def _evidence(near: Adjustment, free: Bools, wanted: Bools) -> tuple[float, float]:
-    """T over what chance may make it, zero if it would not matter; pixels that it explains."""
+def _evidence(near: Adjustment, free: Bools, wanted: Bools, far: bool) -> float:
+    """T over what chance may make it, zero if that is more, or if it would not matter.
+
+    Where views are far apart, the pixels that it explains.
+    """
     told, own = free | wanted, (wanted & ~free)[free | wanted]
     (rows, target, size), (missed, slopes) = near.system, near.weighed
     rows, size, slopes = rows[:, told], size[told], slopes[..., told]
@@ -592,8 +587,11 @@ def _evidence(near: Adjustment, free: Bools, wanted: Bools) -> tuple[float, floa
     # integral) to estimate the covariance with: Hotelling's T.
     degrees = 1.5 * len(each) / (bandwidth(each) + 1)
     rest_degrees = degrees - rank + 1
+    if far:
+        return float(explained)
     if explained < FINE or rest_degrees <= 0:
-        return 0.0, explained
+        return 0.0
     # The chance of a T that large without a cause.
     chance = float(fdtri(rank, rest_degrees, 1 - 1e-6))
-    return float(score @ score) * rest_degrees / (chance * rank * degrees), explained
+    evidence = float(score @ score) * rest_degrees / (chance * rank * degrees)
+    return evidence if evidence > 1 else 0.0

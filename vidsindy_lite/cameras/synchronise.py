@@ -365,12 +365,11 @@ def _climbed(
     best = np.array([lags[0] for lags in promising])
     fits(first)
     while True:
-        others = [(i, lag) for i in range(count) for lag in promising[i] if lag != best[i]]
-        every = [best, *(np.where(np.arange(count) == i, lag, best) for i, lag in others)]
-        winner = int(np.argmin([fits(lags) for lags in every]))
-        if winner == 0:
+        moved = ((i, lag) for i in range(count) for lag in promising[i])
+        winner = min((np.where(np.arange(count) == i, lag, best) for i, lag in moved), key=fits)
+        if fits(winner) >= fits(best):
             break
-        best = every[winner]
+        best = winner
     return _different(sorted((f for f in tried.values() if f is not None), key=score))
 
 
