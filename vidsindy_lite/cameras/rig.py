@@ -206,10 +206,11 @@ class Rig:
         """
         points = check_rows("x", x, 3)
         points = points[~np.isnan(points).any(axis=1)]
-        if len(np.unique(points, axis=0)) < 2:
+        different = len(np.unique(points, axis=0))
+        if different < 2:
             raise ValueError(
-                "x: must hold at least two different points, got "
-                f"{len(np.unique(points, axis=0))} without NaN in shape {np.shape(x)}"
+                f"x: must hold at least two different points, got {different} without NaN in "
+                f"shape {np.shape(x)}"
             )
         low, high = points.min(axis=0), points.max(axis=0)
         middle, reach = (low + high) / 2, np.linalg.norm(high - low)

@@ -557,11 +557,9 @@ def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str
             elif not known & views:
                 ways = [", or ".join(ways)]
         for axis, how in enumerate(ways):
-            tracks = [
-                np.where(np.arange(2) == axis, np.array(size) - 1 - track, track)
-                if i in views else track
-                for i, (track, size) in enumerate(zip(given.tracks, sizes, strict=True))
-            ]  # fmt: skip
+            each = enumerate(zip(given.tracks, np.array(sizes) - 1, strict=True))
+            turned = np.arange(2) == axis
+            tracks = [np.where(turned & (i in views), side - x, x) for i, (x, side) in each]
             yield f"{told} {how}", Footage.of(tracks, None, given.rates, given.clocks)
     for i, (real, stated) in product(range(count), RATES):
         rates = np.where(np.arange(count) == i, real / stated, 1.0) * given.rates
