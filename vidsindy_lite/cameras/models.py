@@ -794,6 +794,7 @@ def trimmed(residual: Floats, share: float = TRIMMED) -> float:
     return float(ratio * np.quantile(np.hypot(*seen.T), share))
 
 
+@np.errstate(all="ignore")  # lines that hardly cross may send a point far away
 def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floats, Bools]:
     """Points that calibrated cameras of any model see at given pixels, by least squares in pixels.
 
@@ -915,10 +916,9 @@ def _reprojection(
     matrices: Floats, scales: Floats, turned: Floats, visible: Bools, x: Floats
 ) -> tuple[Floats, Floats]:
     """Slopes of the T x_c at which points are seen, (n, 2 m, 3), and how far these are off."""
-    with np.errstate(all="ignore"):  # lines that hardly cross may send a point far away
-        image = np.moveaxis(x @ matrices[:, :, :3].swapaxes(1, 2), 0, 1) + matrices[:, :, 3]
-        plane, depth = image[..., :2] / image[..., 2:], image[..., 2, None, None]
-        slope = _lines(matrices, plane)[0] / (scales[:, None, None] * depth)
+    image = np.moveaxis(x @ matrices[:, :, :3].swapaxes(1, 2), 0, 1) + matrices[:, :, 3]
+    plane, depth = image[..., :2] / image[..., 2:], image[..., 2, None, None]
+    slope = _lines(matrices, plane)[0] / (scales[:, None, None] * depth)
     return _stacked(slope, turned - plane / scales[:, None], visible)
 
 
