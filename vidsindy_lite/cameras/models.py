@@ -524,7 +524,7 @@ def frozen(array: Floats) -> Floats:
 def undistorted(points: Floats, coefficients: Floats) -> Floats:
     """Points of the ideal image that are seen at `points`, (n, 2).
 
-    NaN where the model shows none: beyond the circle in which its images do not overlap.
+    NaN where the model shows none there, as beyond the circle where its image folds.
     """
     if not len(points):  # which OpenCV refuses
         return points
