@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from . import cameras, dynamics, vision
 from .arrays import Floats
-from .cameras import Clock, Lags, Rig
+from .cameras import Clock, Footage, Lags, Rig
 from .checks import (
     check_choice,
     check_instance,
@@ -257,46 +257,44 @@ def _observed(
     synchronous: bool = False,
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
-    begun = np.zeros(len(raw)) if lags is None else lags
+    films = Footage.of(raw, lags, clock.rates, clock.frames)
     if not rig.is_measured:
         with refusing("cameras", raw, names):
-            far = cameras.factorised(raw, rig, clock.rates, clock.uneven, lags)
+            far = cameras.factorised(films, rig, lags is not None)
             if far is None or far.moving > 1:  # a line tells of no lens
                 alike = np.inf if far is None else cameras.ALIKE * far.lags.residual
                 most = min(cameras.GROSS, alike)
-                at_once = cameras.align(raw, begun, clock.rates, clock.uneven)
                 try:
-                    rig, far = cameras.posed(at_once, rig, lags is not None, most), None
+                    rig, far = cameras.posed(films.aligned, rig, lags is not None, most), None
                 except ValueError:
                     if far is None:
                         raise
             if far is not None:
-                tracks = cameras.align(raw, far.lags.frames, clock.rates, clock.uneven)
+                tracks = replace(films, lags=far.lags.frames).aligned
                 warnings = (*far.lags.warnings, *doubts)
                 return _concluded(raw, tracks, far.rig, far.lags, clock, [], warnings, far.moving)
             doubts = (*rig.warnings, *doubts)
     first: list[str] = []
     start = lags
     if not synchronous:
-        mistake = cameras.find_mistake(raw, rig, clock.rates, clock.uneven, begun, names)
+        mistake = cameras.find_mistake(films, rig, names)
         if mistake is not None:  # and is put right, as nothing can be learned with it
-            first, raw = [mistake.text], mistake.footage.tracks
-            clock = clock.mended(mistake.footage.rates, mistake.footage.clocks)
+            first, films = [mistake.text], mistake.footage
+            raw, clock = films.tracks, clock.mended(films)
             lags, start = None, mistake.lags.frames
     with refusing("lags", raw, names):
         if synchronous:
-            nothing = np.zeros(len(raw))
-            best = Lags(nothing, clock.rates, nothing, 0.0, clocks=tuple(clock.uneven or ()))
+            best = Lags(films.lags, films.rates, films.lags, 0.0, clocks=films.uneven)
         else:
-            rates, uneven = clock.rates, clock.uneven
-            best = cameras.learn_lags(raw, rig, rates, start, uneven, progress=progress)
+            rates, frames = clock.rates, clock.frames
+            best = cameras.learn_lags(raw, rig, rates, start, frames, progress=progress)
         if lags is not None and _apart(lags, best, _WRONG_LAG):
             raise ValueError(
                 f"lags: must make the views agree, got ({cameras.list_lags(lags)}) frames where "
                 f"({cameras.list_lags(best.frames)}) do: leave them out, or check them"
             )
     used = best.frames if lags is None else lags
-    tracks = cameras.align(raw, used, best.rates, clock.uneven)
+    tracks = replace(films, lags=used, rates=best.rates).aligned
     with refusing("cameras", raw, names):
         learned = cameras.learn_cameras(tracks, rig)
     missed = cameras.disagreement(tracks, learned)
@@ -342,7 +340,7 @@ def _several_observed(
     """What the tracks (n_i, 2 k) of k targets tell: once told apart, they are one long track."""
     count, begun = raw[0].shape[1] // 2, np.zeros(len(raw)) if lags is None else lags
     each = zip(*(np.split(track, count, axis=1) for track in raw), strict=True)
-    aligned = [cameras.align(one, begun, clock.rates, clock.uneven) for one in each]
+    aligned = [Footage.of(one, begun, clock.rates, clock.frames).aligned for one in each]
     tracks = [np.hstack(views) for views in zip(*aligned, strict=True)]
     with refusing("cameras", tracks, names):
         who = cameras.identify(tracks, rig)
@@ -742,12 +740,10 @@ def _times(
     if t is not None:
         return t, []
     if fps is None:
-        stated = []
         for track in read:
             if track.t is None:
                 raise ValueError(f"t: must be given, or fps, as {track.name} states no times")
-            stated.append(track.t)
-        return stated, []
+        return [track.t for track in read if track.t is not None], []
     given, doubts = check_positive("fps", fps), []
     for track in read:
         if track.t is not None and len(track.t) > 1:

@@ -143,7 +143,7 @@ def test_calibration_errors(small):
     )
     expected = [[0.01, 0.1 - np.pi], [0, 0], [0, 0]]
     np.testing.assert_allclose(calibration_errors(off, truth), expected, atol=1e-12)
-    with pytest.raises(ValueError, match="must have as many cameras as truth, got 2 and 3"):
+    with pytest.raises(ValueError, match="rig: must be one per camera of truth, got 2 for 3"):
         calibration_errors(Rig(others), truth)
     with pytest.raises(
         ValueError, match=r"truth: all cameras must be calibrated and placed, got cameras\[1\]"

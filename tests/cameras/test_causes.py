@@ -10,7 +10,7 @@ from scipy.interpolate import make_interp_spline
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
-from vidsindy_lite.cameras import explain, find_mistake, learn_cameras
+from vidsindy_lite.cameras import Footage, explain, find_mistake, learn_cameras
 
 NAMES = ["a.mp4", "b.mp4", "c.mp4", "d.mp4"]
 FRAMES = np.arange(300)
@@ -173,11 +173,11 @@ MISTAKES = {
 def test_a_mistake_is_named(cause, seed, of):
     rig, tracks, sampled, rng = of(seed)
     given, what = MISTAKES[cause](rig, tracks, sampled, rng)
-    found = find_mistake(given, rig, np.ones(3), None, np.zeros(3), VIEWS)
+    found = find_mistake(Footage.of(given), rig, VIEWS)
     assert what in found.text
     assert found.lags.residual < 1
     if cause == "swapped":
-        assert find_mistake(tracks, rig, np.ones(3), None, np.zeros(3), VIEWS) is None
+        assert find_mistake(Footage.of(tracks), rig, VIEWS) is None
 
 
 def test_the_path_is_found_without_it_and_that_is_told_first():

@@ -317,7 +317,6 @@ def test_the_times_of_each_track_are_checked():
     assert clock.ends.tolist() == [5.0, 3.5]  # by the clock of the first
     short = Clock.of_tracks([[0, 2, 4], [7]], [np.zeros((3, 2)), np.zeros((1, 2))])
     assert short.rates.tolist() == [1, 2]
-    assert Clock.of_tracks(np.arange(4) / 30, tracks).uneven is None
     with pytest.raises(ValueError, match=r"t: must have shape \(5,\), one per row of tracks\[1\]"):
         Clock.of_tracks([range(4), range(4)], tracks)
     # One clock for all of them.
@@ -334,7 +333,7 @@ def test_times_that_are_even_but_for_rounding_are_even(off, even):
     times = np.arange(9.0)
     times[4] += off
     clock = Clock.of_tracks([times, np.arange(9.0)], [np.zeros((9, 2))] * 2)
-    assert (clock.uneven is None) == even
+    assert (clock.frames[0].tolist() == [*range(9)]) == even
 
 
 def test_files_that_state_their_rates():

@@ -7,7 +7,7 @@ import pytest
 from helpers import aligned_error, far_off, room, shot, walk
 
 import vidsindy_lite as vl
-from vidsindy_lite.cameras import AffineCamera, factorised, learn_cameras_eq4, posed
+from vidsindy_lite.cameras import AffineCamera, Footage, factorised, learn_cameras_eq4, posed
 from vidsindy_lite.pipeline import observe_tracks
 
 FRAMES = np.arange(240)
@@ -163,7 +163,7 @@ def far_away(views=3, moving=3, noise=0.2, count=240, seed=0):
 @pytest.mark.parametrize(("views", "moving"), [(3, 2), (4, 3)])
 def test_lags_and_axes_of_motion(views, moving):
     tracks, rig = far_away(views, moving)
-    found = factorised(tracks, rig, np.ones(views), None)
+    found = factorised(Footage.of(tracks), rig)
     assert found.moving == moving
     np.testing.assert_allclose(found.lags.frames, LAGS[:views], atol=0.1)
     assert (found.lags.errors[1:] < 0.05).all()
@@ -174,18 +174,19 @@ def test_views_of_different_things_do_not_agree():
     tracks, rig = far_away(count=120)
     rng = np.random.default_rng(1)
     tracks[2] = np.cumsum(rng.normal(size=(120, 2)), axis=0) * 10
-    assert factorised(tracks, rig, np.ones(3), None) is None
+    assert factorised(Footage.of(tracks), rig) is None
     with pytest.raises(ValueError, match="must tell where the cameras stand"):
         vl.observe_tracks(tracks, rig, np.arange(120) / FPS)
 
 
 def test_views_with_nothing_in_common_and_what_stands_still_tell_nothing():
     tracks, rig = far_away()
-    assert factorised(tracks, rig, np.ones(3), None, LAGS[:3]).lags.frames.tolist() == [*LAGS[:3]]
+    told = factorised(Footage.of(tracks, LAGS[:3]), rig, synchronous=True)
+    assert told.lags.frames.tolist() == [*LAGS[:3]]
     tracks[1][:] = np.nan
-    for lags in (None, np.zeros(3)):
-        assert factorised(tracks, rig, np.ones(3), None, lags) is None
-    assert factorised([np.ones_like(track) for track in tracks], rig, np.ones(3), None) is None
+    for synchronous in (False, True):
+        assert factorised(Footage.of(tracks), rig, synchronous) is None
+    assert factorised(Footage.of([np.ones_like(track) for track in tracks]), rig) is None
 
 
 def test_the_law_of_a_swing_needs_no_rig():

@@ -17,7 +17,7 @@ The other rooms import from here alone.
 from .adjust import explain, smooth
 from .calibrate import calibration_errors, check_learnable, learn_cameras, learn_cameras_eq4
 from .calibrate import systematic_errors, tracking_errors
-from .clocks import Clock, Lags, align, list_lags
+from .clocks import Clock, Footage, Lags, align, list_lags
 from .models import AffineCamera, Camera, OrthographicCamera, PerspectiveCamera
 from .models import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance
 from .rig import ALIKE, DISAGREEMENT, GROSS, Rig, disagreement, read_calibration, reconstruct

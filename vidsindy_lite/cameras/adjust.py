@@ -38,7 +38,7 @@ cause, the change c of cameras that one step finds with it free is compared with
 
     T = c' S^-1 c,      S as above, of the residuals that the cause leaves.
 
-A cause that stands out is tried: cameras and path are adjusted with it free.
+With the cause that stands out most free, cameras and path are adjusted.
 
 Newey and West 1987, Econometrica 55; Andrews 1991, Econometrica 59 (the number of frames);
 Triggs et al. 2000, "Bundle adjustment: a modern synthesis".
@@ -46,7 +46,7 @@ Triggs et al. 2000, "Bundle adjustment: a modern synthesis".
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -70,7 +70,7 @@ from .models import (
     intersect,
     trimmed,
 )
-from .rig import FINE, GROSS, Rig, decimals, disagreement, residuals
+from .rig import FINE, GROSS, Rig, decimals, residuals
 
 PARTS = {
     "normal": [0, 1],
@@ -475,21 +475,18 @@ class Cause:
     """
 
     what: str
-    cameras: tuple[int, ...]
     freed: Bools
     found: Adjustment
+
+    @property
+    def cameras(self) -> tuple[int, ...]:
+        """Which ones they are."""
+        return tuple(np.flatnonzero(self.freed.any(axis=1)).tolist())
 
     @property
     def left(self) -> float:
         """`disagreement` of the worst camera of those found, pixels."""
         return self.found.left()
-
-    @property
-    def price(self) -> float:
-        """Schwarz's criterion."""
-        used = np.isfinite(self.found.misses)
-        left = max(float(np.sum(self.found.weighed[0][used] ** 2)), ROUNDING)
-        return float(used.sum() * np.log(left) + self.freed.sum() * np.log(used.sum()))
 
     def text(self, names: Sequence[str]) -> str:
         """What would explain the residuals best, with its value."""
@@ -524,59 +521,58 @@ def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Cause | None:
         Before and after `learn_cameras`.
     """
     errors = np.array([known_to(camera) for camera in given.cameras])
-    far = smooth(tracks, learned) and max(disagreement(tracks, learned)) > GROSS
     footage, start = Footage.of(tracks), learned.cameras
     near = adjust(footage, start, np.where(errors > 0, errors, np.inf), most=0)
-    causes = [cause for cause in _causes(near) if (cause.freed & (errors == 0)).any()]
-    told = [_evidence(near, errors[near.free] > 0, cause.freed[near.free]) for cause in causes]
     # Where views are far apart, and no noise makes it, no test is needed.
-    rank = [explained if far else evidence for evidence, explained in told]
-    # The five that stand out most.
-    likely = [causes[k] for k in np.argsort(rank)[::-1][:5] if rank[k] > (0 if far else 1)]
-    tried = [
-        replace(cause, found=adjust(footage, start, np.where(cause.freed, np.inf, errors)))
-        for cause in likely
+    far = near.left() > GROSS and smooth(tracks, learned)
+    ranked = [
+        (_evidence(near, errors[near.free] > 0, freed[near.free], far), what, freed)
+        for what, freed in _causes(near)
+        if (freed & (errors == 0)).any()
     ]
-    return min(tried, key=lambda cause: cause.price, default=None)
+    most, what, freed = max(ranked, key=lambda one: one[0], default=(0.0, "", errors > 0))
+    if most == 0:
+        return None
+    return Cause(what, freed, adjust(footage, start, np.where(freed, np.inf, errors)))
 
 
 def smooth(tracks: Sequence[Floats], learned: Rig) -> bool:
     """Whether residuals follow the motion, which noise of the tracks does not."""
     missed = np.hstack(residuals(tracks, learned))
-    both = np.isfinite(missed[1:]) & np.isfinite(missed[:-1])
-    limit = np.nanquantile(np.abs(missed), TRIMMED) if both.any() else 0.0
-    before, after = (np.clip(part[both], -limit, limit) for part in (missed[:-1], missed[1:]))
-    # Correlation of a residual with the next; that of noise is zero.
-    return bool(before @ after > 0.3 * np.sqrt((before @ before) * (after @ after)))
+    limit = np.nanquantile(np.abs(missed), TRIMMED) if np.isfinite(missed).any() else 0.0
+    return persistence(np.clip(missed, -limit, limit)) > 0.3
 
 
-def _causes(near: Adjustment) -> list[Cause]:
-    """All that is tried; a lens and a shutter of one camera, and of all as of one make."""
-    every = tuple(range(len(near.start)))
-    flat = tuple(i for i in every if isinstance(near.start[i], OrthographicCamera))
-    pinholes = tuple(i for i in every if i not in flat)
-
-    def cause(what: str, cameras: tuple[int, ...], parts: Sequence[int]) -> Cause:
-        freed = np.zeros(near.errors.shape, bool)
-        freed[np.ix_(cameras, parts)] = True
-        return Cause(what, cameras, freed, near)
-
-    found = [cause("direction", (i,), PARTS["normal"] + PARTS["angle"]) for i in every]
-    found += [
-        cause(what, (i,), PARTS[what][: 2 if i in flat else None])
-        for what in ("position", "scale", "readout", "lag", "drift")
-        for i in every
-    ]
-    lens = PARTS["distortion"][:2]  # k1 and k2: few motions tell more
-    found += [cause("distortion", (i,), lens) for i in pinholes]
-    found.append(cause("readout", every, PARTS["readout"]))
-    if pinholes:
-        found.append(cause("distortion", pinholes, lens))
-    return found
+def persistence(missed: Floats) -> float:
+    """Correlation of residuals, (n, k), with those of the next frame; that of noise is zero."""
+    now, then = missed[:-1], missed[1:]
+    both = np.isfinite(now) & np.isfinite(then)
+    squares = np.sqrt(np.sum(now[both] ** 2) * np.sum(then[both] ** 2))
+    return float(np.sum((now * then)[both]) / max(squares, 1e-300))
 
 
-def _evidence(near: Adjustment, free: Bools, wanted: Bools) -> tuple[float, float]:
-    """T over what chance may make it, zero if it would not matter; pixels that it explains."""
+def _causes(near: Adjustment) -> Iterator[tuple[str, Bools]]:
+    """All that is tried, and what it frees; a lens and a shutter of one camera, and of all."""
+    parts = {what: PARTS[what] for what in ("position", "scale", "readout", "lag", "drift")}
+    parts["direction"] = PARTS["normal"] + PARTS["angle"]
+    parts["distortion"] = PARTS["distortion"][:2]  # k1 and k2: few motions tell more
+    senseless = np.zeros(near.errors.shape, bool)
+    for i, camera in enumerate(near.start):
+        if isinstance(camera, OrthographicCamera):
+            senseless[i, [PARTS["position"][2], *PARTS["distortion"]]] = True
+    every = range(len(near.start))
+    for what, places in parts.items():
+        for some in [[i] for i in every] + [[*every]] * (what in ("readout", "distortion")):
+            freed = np.zeros(senseless.shape, bool)
+            freed[np.ix_(some, places)] = True
+            yield what, freed & ~senseless
+
+
+def _evidence(near: Adjustment, free: Bools, wanted: Bools, far: bool) -> float:
+    """T over what chance may make it, zero if that is more, or if it would not matter.
+
+    Where views are far apart, the pixels that it explains.
+    """
     told, own = free | wanted, (wanted & ~free)[free | wanted]
     (rows, target, size), (missed, slopes) = near.system, near.weighed
     rows, size, slopes = rows[:, told], size[told], slopes[..., told]
@@ -591,8 +587,11 @@ def _evidence(near: Adjustment, free: Bools, wanted: Bools) -> tuple[float, floa
     # integral) to estimate the covariance with: Hotelling's T.
     degrees = 1.5 * len(each) / (bandwidth(each) + 1)
     rest_degrees = degrees - rank + 1
+    if far:
+        return float(explained)
     if explained < FINE or rest_degrees <= 0:
-        return 0.0, explained
+        return 0.0
     # The chance of a T that large without a cause.
     chance = float(fdtri(rank, rest_degrees, 1 - 1e-6))
-    return float(score @ score) * rest_degrees / (chance * rank * degrees), explained
+    evidence = float(score @ score) * rest_degrees / (chance * rank * degrees)
+    return evidence if evidence > 1 else 0.0

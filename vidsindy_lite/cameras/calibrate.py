@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..checks import check_instance
+from ..checks import check_instance, check_items
 from .adjust import DRIFT, LAG, PARTS, adjust, known_to
 from .clocks import Footage, Lags
 from .models import (
@@ -382,12 +382,8 @@ def calibration_errors(rig: Rig, truth: Rig) -> Floats:
     """
     check_calibrated("rig", rig)
     check_calibrated("truth", truth)
-    if len(rig.cameras) != len(truth.cameras):
-        raise ValueError(
-            f"rig: must have as many cameras as truth, got {len(rig.cameras)} "
-            f"and {len(truth.cameras)}"
-        )
-    pairs = zip(rig.cameras, truth.cameras, strict=True)
+    learned = check_items("rig", rig.cameras, len(truth.cameras), "camera of truth")
+    pairs = zip(learned, truth.cameras, strict=True)
     known = ((a.calibration, b.calibration) for a, b in pairs)
     return np.array([(s / r - 1, np.angle(np.exp(1j * (a - b)))) for (s, a), (r, b) in known])
 

@@ -152,7 +152,7 @@ class Curve:
     def _spline(self) -> BSpline:
         count = int(self.shown.sum())
         # Where a frame was dropped, a cubic is off by some ten times as much as between two frames.
-        degree = 3 if (self.clock == np.arange(len(self.clock))).all() else 5
+        degree = 3 if _is_even(self.clock) else 5
         seen = self.clock[self.shown], self.track[self.shown]
         return make_interp_spline(*seen, k=min(degree, count - 1))
 
@@ -219,6 +219,11 @@ class Footage:
     def clocks(self) -> tuple[Floats, ...]:
         """When each frame of each video was taken, see `align`."""
         return tuple(curve.clock for curve in self.curves)
+
+    @property
+    def uneven(self) -> tuple[Floats, ...]:
+        """The clocks, if that of any video is not 0, 1, 2, ..."""
+        return () if all(map(_is_even, self.clocks)) else self.clocks
 
     @property
     def lengths(self) -> Floats:
@@ -289,10 +294,7 @@ def check_clocks(given: Sequence[ArrayLike] | None, tracks: Sequence[Floats]) ->
     """When each frame of each track was taken, the first one at zero."""
     if given is None:
         return tuple(np.arange(len(track), dtype=float) for track in tracks)
-    each = check_items("clocks", given)
-    if len(each) != len(tracks):
-        raise ValueError(f"clocks: must be one per track, got {len(each)} for {len(tracks)}")
-    clocks = []
+    clocks, each = [], check_items("clocks", given, len(tracks), "track")
     for i, (clock, track) in enumerate(zip(each, tracks, strict=True)):
         checked = check_vector(f"clocks[{i}]", clock, len(track))
         if (np.diff(checked) <= 0).any():
@@ -320,22 +322,17 @@ class Clock:
     frames: Sequence[Floats]
 
     @property
-    def uneven(self) -> Sequence[Floats] | None:
-        """The frames' clocks, if that of any video is not 0, 1, 2, ..."""
-        return None if all(map(_is_even, self.frames)) else self.frames
-
-    @property
     def ends(self) -> Floats:
         """How long each video takes, in frames of the first, shape (m,)."""
         return np.array([frames[-1] + 1 for frames in self.frames]) / self.rates
 
-    def mended(self, rates: Floats, frames: Sequence[Floats]) -> Clock:
-        """The same with other rates and frames; the times are those of the new first video's."""
-        times, old, new = self.times, self.frames[0], frames[0]
+    def mended(self, footage: Footage) -> Clock:
+        """That of footage which was put right; the times are those of its first video."""
+        times, old, new = self.times, self.frames[0], footage.instants
         if not np.array_equal(new, old):
             step = np.ptp(times) / np.ptp(old)
             times = times[0] + step * new
-        return Clock(times, rates, frames)
+        return Clock(times, footage.rates, footage.clocks)
 
     @classmethod
     def of_tracks(cls, t: ArrayLike | Sequence[ArrayLike], tracks: Sequence[Floats]) -> Clock:

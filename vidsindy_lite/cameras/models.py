@@ -56,7 +56,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats
 from ..checks import (
     check_array,
     check_image_size,
@@ -79,8 +79,9 @@ USUAL = 5
 TRIMMED = 0.9
 """Share of the instants that must agree; the others may hold anything."""
 
-_STEPS = 30  # of Newton, from the distorted point, or the linear solution: four or five are usual
+_STEPS = 30  # of Newton, from the linear solution: four or five are usual
 _SETTLED = 1e-14  # of the focal length
+_UNBENT = 20_000  # steps of OpenCV to the ideal image; most in a hair of where the image folds
 _LARGEST = 0.49  # frames; so instants never overtake each other, whatever an outlier says
 _DOWN = np.array([1.0, -1.0])  # the lens's y is down, the ideal image's up
 
@@ -523,38 +524,24 @@ def frozen(array: Floats) -> Floats:
 def undistorted(points: Floats, coefficients: Floats) -> Floats:
     """Points of the ideal image that are seen at `points`, (n, 2).
 
-    NaN where the model shows none: beyond the circle in which its images do not overlap.
+    NaN where the model shows none there, as beyond the circle where its image folds.
     """
-    ideal = np.full_like(points, np.nan)
-    shown = np.isfinite(points).all(axis=1)
-    wanted = points[shown]
-
-    def look(tried: Floats, which: Ints) -> tuple[Floats, Floats]:
-        seen, slope = _lens(tried, coefficients)
-        # Where the slope is not positive definite the image turns over: no lens does that.
-        good = (slope[:, 0, 0] > 0) & (slope[:, 0, 0] * slope[:, 1, 1] > slope[:, 0, 1] ** 2)
-        return slope, np.where(good[:, None], wanted[which] - seen, np.nan)
-
-    found, _ = _gauss_newton(look, wanted, _SETTLED)
-    _, missed = look(found, np.arange(len(found)))
-    found[~(np.abs(missed).max(axis=1) < np.sqrt(_SETTLED))] = np.nan
-    ideal[shown] = found
-    return ideal
+    if not len(points):  # which OpenCV refuses
+        return points
+    enough = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, _UNBENT, _SETTLED)
+    ideal = cv2.undistortPoints(points[:, None], np.eye(3), coefficients, criteria=enough)
+    found = np.asarray(ideal[:, 0], float)
+    found[~(np.abs(distorted(found, coefficients) - points).max(axis=1) < 1e-7)] = np.nan
+    return found
 
 
 def distorted(points: Floats, coefficients: Floats) -> Floats:
     """Where points of the ideal image, (n, 2), are seen through the lens."""
-    return _lens(points, coefficients)[0]
-
-
-def _lens(points: Floats, coefficients: Floats) -> tuple[Floats, Floats]:
-    """Where points of the ideal image, (n, 2), are seen through the lens; slopes, (n, 2, 2)."""
     if not len(points):  # which OpenCV refuses
-        return points, np.zeros((0, 2, 2))
+        return points
     ahead, still = np.column_stack((points, np.ones(len(points)))), np.zeros(3)
-    seen, slope = cv2.projectPoints(ahead[:, None], still, still, np.eye(3), coefficients)
-    # To move the image of a point at distance 1 is to move the point as far.
-    return np.asarray(seen[:, 0], float), np.asarray(slope[:, 3:5].reshape(-1, 2, 2), float)
+    seen, _ = cv2.projectPoints(ahead[:, None], still, still, np.eye(3), coefficients)
+    return np.asarray(seen[:, 0], float)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -807,6 +794,7 @@ def trimmed(residual: Floats, share: float = TRIMMED) -> float:
     return float(ratio * np.quantile(np.hypot(*seen.T), share))
 
 
+@np.errstate(all="ignore")  # lines that hardly cross may send a point far away
 def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floats, Bools]:
     """Points that calibrated cameras of any model see at given pixels, by least squares in pixels.
 
@@ -833,30 +821,34 @@ def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floa
     seen = np.where(visible[..., None], seen, 0)
 
     left, right = _stacked(*_lines(matrices, scales[:, None] * seen), visible)
+    x, part = _least_squares(left, right), np.ones(len(left))
     crossing = (np.linalg.svd(left, compute_uv=False) > PARALLEL).sum(axis=1) == 3
-    x, ended = np.full((len(crossing), 3), np.nan), np.ones(len(crossing), bool)
-    seen, visible = seen[crossing], visible[crossing]
-
-    def look(point: Floats, frames: Ints) -> tuple[Floats, Floats]:
-        slope, missed = _reprojection(matrices, scales, seen[frames], point)
-        return _stacked(slope, missed, visible[frames])
-
-    start = _least_squares(left[crossing], right[crossing])
-    point, settled = _gauss_newton(look, start, SETTLED)
-    depth = point @ matrices[:, 2, :3].T + matrices[:, 2, 3]
-    point[(visible & (depth <= 0)).any(axis=1)] = np.nan
-    x[crossing], ended[crossing] = point, settled
-    return x, ended
+    slope, off = _reprojection(matrices, scales, seen, visible, x)
+    active = np.flatnonzero(crossing)
+    for _ in range(_STEPS):
+        step = part[active, None] * _least_squares(slope[active], off[active])
+        tried = x[active] + step
+        new_slope, new_off = _reprojection(matrices, scales, seen[active], visible[active], tried)
+        error, new_error = np.sum(off[active] ** 2, axis=1), np.sum(new_off**2, axis=1)
+        moved = np.abs(slope[active] @ step[..., None]).max(axis=(1, 2), initial=0)
+        lower = new_error <= (1 + 1e-12) * error + SETTLED**2  # or equal, but for rounding
+        part[active] = np.where(lower, 1, part[active] / 2)  # of a step that leads uphill
+        taken = active[lower]
+        x[taken], slope[taken], off[taken] = tried[lower], new_slope[lower], new_off[lower]
+        active = active[~(moved <= SETTLED)]
+        if not active.size:
+            break
+    depth = x @ matrices[:, 2, :3].T + matrices[:, 2, 3]
+    x[(visible & (depth <= 0)).any(axis=1) | ~crossing] = np.nan
+    return x, ~np.isin(np.arange(len(x)), active)
 
 
 def epipolar_lines(known: Camera, pixels: Floats, unknown: Camera) -> tuple[Floats, Floats]:
     """What the lines of sight of one camera are in the image of another, of whatever scale.
 
-    On the line x = a + lambda d of the known camera, numerator and denominator of the unknown
-    one are g + lambda h and u + lambda v. That (g + lambda h) = (u + lambda v) s T x_c for some
-    lambda means, taking lambda out,
-
-        (u h - v g) x (s T x_c) = h x g        (x: cross product in the plane).
+    For the matrices P of the known camera and Q of the other, the line of sight of the homogeneous
+    pixel y = (s T x_c, 1) goes through pinv(P) y and the camera's centre C, P C = 0. Both are seen
+    by the other on the line l = (Q pinv(P) y) x (Q C), and its own pixel there has l' y = 0.
 
     Parameters
     ----------
@@ -870,25 +862,23 @@ def epipolar_lines(known: Camera, pixels: Floats, unknown: Camera) -> tuple[Floa
     Returns
     -------
     normals : ndarray, shape (n, 2)
-        u h - v g at unit length; NaN where the point is not seen, or the cameras cannot disagree
+        (l2, -l1) at unit length; NaN where the point is not seen, or the cameras cannot disagree
         on it.
     constants : ndarray, shape (n,)
-        h x g in the same unit: scene units, or for a perspective camera those at distance 1.
+        -l3 in the same unit: scene units, or for a perspective camera those at distance 1.
     """
     known, unknown = (c if c.is_placed else c.placed(np.zeros(2)) for c in (known, unknown))
-    plane = known.calibration[0] * known.turned(pixels)[:, None]
-    left, right = (part[:, 0] for part in _lines(known.matrix[None], plane))
-    one, other = left[:, 0], left[:, 1]
-    direction = np.cross(one, other)
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    # The point of each line that is closest to the origin.
-    closest = right[:, :1] * np.cross(other, direction) + right[:, 1:] * np.cross(direction, one)
-    on_line = closest / np.linalg.norm(np.cross(one, other), axis=1, keepdims=True)
-    linear, constant = np.split(unknown.matrix, [3], axis=1)
-    g, h = on_line @ linear.T + constant[:, 0], direction @ linear.T
-    line = np.cross(g, h)  # of homogeneous image points
+    plane = known.calibration[0] * known.turned(pixels)
+    homogeneous = np.column_stack((plane, np.ones(len(plane))))
+    # Seen from the known camera: a scene far from its origin costs no digits.
+    home = np.eye(4)
+    home[:3, 3] = known.position
+    ours, theirs = known.matrix @ home, unknown.matrix @ home
+    point = homogeneous @ (theirs @ np.linalg.pinv(ours)).T
+    epipole = theirs @ np.linalg.svd(ours)[2][3]
+    line = np.cross(point, epipole)
     size = np.linalg.norm(line[:, :2], axis=1)
-    reach = np.abs(g[:, 2]) + np.abs(h[:, 2]) * np.linalg.norm(g[:, :2], axis=1)
+    reach = np.linalg.norm(point, axis=1) * np.linalg.norm(epipole)
     line[~(size > PARALLEL * reach)] = np.nan
     line /= size[:, None]
     return line[:, 1::-1] * [1, -1], -line[:, 2]
@@ -923,13 +913,13 @@ def _lines(matrices: Floats, plane: Floats) -> tuple[Floats, Floats]:
 
 
 def _reprojection(
-    matrices: Floats, scales: Floats, turned: Floats, x: Floats
+    matrices: Floats, scales: Floats, turned: Floats, visible: Bools, x: Floats
 ) -> tuple[Floats, Floats]:
-    """Slope of the T x_c at which points are seen, (n, m, 2, 3), and how far it is off."""
+    """Slopes of the T x_c at which points are seen, (n, 2 m, 3), and how far these are off."""
     image = np.moveaxis(x @ matrices[:, :, :3].swapaxes(1, 2), 0, 1) + matrices[:, :, 3]
     plane, depth = image[..., :2] / image[..., 2:], image[..., 2, None, None]
-    slope, _ = _lines(matrices, plane)
-    return slope / (scales[:, None, None] * depth), turned - plane / scales[:, None]
+    slope = _lines(matrices, plane)[0] / (scales[:, None, None] * depth)
+    return _stacked(slope, turned - plane / scales[:, None], visible)
 
 
 def _stacked(left: Floats, right: Floats, visible: Bools) -> tuple[Floats, Floats]:
@@ -937,34 +927,6 @@ def _stacked(left: Floats, right: Floats, visible: Bools) -> tuple[Floats, Float
     rows = 2 * visible.shape[1]
     left = np.where(visible[..., None, None], left, 0).reshape(-1, rows, 3)
     return left, np.where(visible[..., None], right, 0).reshape(-1, rows)
-
-
-def _gauss_newton(
-    look: Callable[[Floats, Ints], tuple[Floats, Floats]], start: Floats, enough: float
-) -> tuple[Floats, Bools]:
-    """Points of the least squared misses, each searched by itself, and which of them settled.
-
-    `look(points, frames)` gives the slopes, (k, m, d), and the misses, (k, m); a last step changes
-    these by so little.
-    """
-    point, active = start.copy(), np.arange(len(start))
-    part = np.ones(len(start))  # of the step, halved where the whole one leads uphill
-    slope, missed = look(point, active)
-    for _ in range(_STEPS):
-        step = part[active, None] * _least_squares(slope[active], missed[active])
-        with np.errstate(all="ignore"):  # lines that hardly cross may send a point far away
-            new_slope, new_missed = look(point[active] + step, active)
-            new_error, error = np.sum(new_missed**2, axis=1), np.sum(missed[active] ** 2, axis=1)
-        moved = np.abs(slope[active] @ step[..., None]).max(axis=(1, 2), initial=0)
-        lower = new_error <= (1 + 1e-12) * error + enough**2  # or equal, but for rounding
-        part[active] = np.where(lower, 1, part[active] / 2)
-        taken = active[lower]
-        point[taken] += step[lower]
-        slope[taken], missed[taken] = new_slope[lower], new_missed[lower]
-        active = active[~(moved <= enough)]
-        if not active.size:
-            break
-    return point, ~np.isin(np.arange(len(start)), active)
 
 
 def _least_squares(left: Floats, right: Floats) -> Floats:

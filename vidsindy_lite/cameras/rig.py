@@ -32,8 +32,10 @@ from __future__ import annotations
 
 import os
 import re
+import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -87,77 +89,21 @@ GROSS = 4.0
 """Pixels; real calibrations of real tracks leave up to half of that."""
 _FEWEST = 3  # cameras of which nothing is measured
 _MOST = 100  # cameras of a template
-_HEAD = """\
-# Rig file: one [[camera]] table per video, in the order of the videos.
-# Choose an origin, axes (z up) and a unit of length (here: metres) and replace every number.
-"""
-_STILL = """\
-# Cameras stand still. What is left out is learned from the videos, but for one camera at least
-# scale and angle must be given.
-"""
-_MEASURED = """\
-# Cameras stand still. Errors are those of a tape and of the eye: one standard deviation each; the
-# videos then tell better. Without its error, a number is taken as exact.
-"""
-_FLAT = """
-[[camera]]
-position = [{place}]    # of the camera, or a landmark in the middle of its image
-normal = [{normal}]    # from the scene to the camera; any length
-image_size = [{width}, {height}]
-"""
-_FIRST = """\
-scale = 0.005    # scene units per pixel: length of an object over its pixels
-angle = {angle:.3f}    # radians: for this normal and the z axis upright in the image; add how
-                  # far the z axis is turned anticlockwise there
-"""
-_BY_HAND = """
-[[camera]]
-model = "perspective"
-position = [{place}]    # of its lens
-image_size = [{width}, {height}]
-looks_at = [0.000, 0.000, 0.000]    # what stands in the middle of its image (or give normal)
-field_of_view = 60    # degrees across the width of the video (or give scale and angle)
-roll = 0    # degrees by which the z axis leans to the left in its image; 0 for a level camera
-position_error = 0.03    # metres in each direction
-normal_error = 2    # degrees, of where it looks and of its roll
-scale_error = 0.03    # share of the focal length: 3 %
-"""
 _LOOKS = ("looks_at", "field_of_view", "roll")  # keys that a hand can measure
-_NAMES = {
-    "K": ("k", "matrix", "camera_matrix", "cameramatrix", "intrinsics", "intrinsic_matrix", "mtx"),
-    "dist": (
-        "dist", "d", "distortions", "distortion", "distortion_coefficients", "dist_coeffs",
-        "distcoeffs", "dist_coefs",
-    ),
-    "R": ("r", "rotation", "rvec", "rotation_matrix", "rot"),
-    "t": ("t", "translation", "tvec", "translation_vector"),
-    "size": ("size", "image_size", "imagesize", "resolution", "img_size"),
-    "P": ("p", "projection_matrix"),
-}  # fmt: skip
-_SIZES = (("image_width", "image_height"), ("width", "height"), ("img_width", "img_height"))
-_MARKS = dict.fromkeys(("ignore", "ignored", "disabled", "exclude", "excluded", "skip"), True)
-_MARKS |= dict.fromkeys(("enabled", "active", "use", "used", "included", "valid"), False)
+_TEXTS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+_KEYS: dict[str, Any] = _TEXTS["keys"]
+_NAMES: dict[str, list[str]] = _KEYS["names"]
+_MARKS = dict.fromkeys(_KEYS["ignored"], True) | dict.fromkeys(_KEYS["used"], False)
 """Keys that mark a camera as one to be left out: if they are set, or if they are not."""
 _LENS = re.compile(r"model|lens|projection_?type|^camera_?type")
 """Keys that say which lens it is, ..."""
-_OURS = (
-    "pinhole", "perspective", "opencv", "plumb", "radtan", "radial", "brown", "standard",
-    "rational", "polynomial", "simple", "lensmodel_opencv", "lensmodel_pinhole",
-)  # fmt: skip
-"""... the beginnings of the names of ours, ..."""
 _OTHERS = re.compile(
     "fish|equi|kannala|kb4|omni|mei|spher|ucm|unified|fov|atan|scaramuzza|ocam|division|thin|tilt|"
     "ortho|panor|theta|stereograph"
 )
-"""... and parts of the names of others."""
+"""... and parts of the names of those that are none of ours."""
 _LENSES = f"of {', '.join(LENS)}"
-_KNOWN = {key for keys in (*_NAMES.values(), *_SIZES, _MARKS) for key in keys} | {
-    "name", "camera", "camera_name", "cam_id", "id", "serial", "serial_number", "port", "index",
-    "error", "rms", "reprojection_error", "avg_reprojection_error", "grid_count", "flags", "date",
-    "calibration_time", "calibration_date", "verified_resolutions", "exposure", "board_width",
-    "board_height", "square_size", "nframes", "nr_of_frames", "fps", "frame_rate", "fisheye",
-    "rotation_count", "distortion_model", "distortion_type",
-}  # fmt: skip
+_KNOWN = {*chain(_KEYS["known"], _MARKS, *_KEYS["sides"], *_NAMES.values())}
 """Keys that are read, and those that change nothing of what a camera sees."""
 _SKEWED = 5.0  # pixels, at the edge of the image, that are no camera's
 
@@ -260,10 +206,11 @@ class Rig:
         """
         points = check_rows("x", x, 3)
         points = points[~np.isnan(points).any(axis=1)]
-        if len(np.unique(points, axis=0)) < 2:
+        different = len(np.unique(points, axis=0))
+        if different < 2:
             raise ValueError(
-                "x: must hold at least two different points, got "
-                f"{len(np.unique(points, axis=0))} without NaN in shape {np.shape(x)}"
+                f"x: must hold at least two different points, got {different} without NaN in "
+                f"shape {np.shape(x)}"
             )
         low, high = points.min(axis=0), points.max(axis=0)
         middle, reach = (low + high) / 2, np.linalg.norm(high - low)
@@ -508,18 +455,17 @@ def rig_template(
         raise ValueError(f"cameras: must be at most {_MOST}, got {cameras}")
     check_choice("model", model, [OrthographicCamera.model, PerspectiveCamera.model])
     width, height = check_image_size(image_size)
-    flat = model == OrthographicCamera.model
-    text = _HEAD + (_STILL if flat else _MEASURED)
+    template = _TEXTS["template"][model]
+    text = template["head"]
     for i in range(cameras):
         # Of two cameras, one is a third of a turn from the other: face to face both see the same.
         azimuth = 2 * np.pi * i / max(cameras, 3) + np.deg2rad(20)
         normal, upright = _looking_down(azimuth, np.deg2rad(20))
-        camera = _BY_HAND if not flat else _FLAT if i else _FLAT + _FIRST
-        text += camera.format(
+        text += (template["camera"] + ("" if i else template["first"])).format(
             place=decimals(3 * normal), normal=decimals(normal), angle=upright, width=width,
             height=height,
         )  # fmt: skip
-    return text
+    return str(text)
 
 
 def _looking_down(azimuth: float, elevation: float) -> tuple[Floats, float]:
@@ -700,7 +646,7 @@ def _tables(content: Any, name: str, warnings: list[str]) -> Iterator[tuple[str,
         for key, part in content.items():
             yield from _tables(part, f"camera {key}: ", warnings)
         return
-    sides = next((sides for sides in _SIZES if set(sides) <= set(lower)), ())
+    sides = next((sides for sides in _KEYS["sides"] if set(sides) <= set(lower)), ())
     if sides and "size" not in known:
         known["size"] = [lower[side] for side in sides]
     strange = [
@@ -729,7 +675,7 @@ def _check_lens(key: str, value: Any, name: str, warnings: list[str]) -> None:
         raise ValueError(f"{name}{key}: must be none but of a lens {_LENSES}, got {shown(value)}")
     if re.fullmatch(r"[kp][1-6]|skew", key) or ("dist" in key and key not in _KNOWN):
         raise ValueError(f"{name}{key}: must stand in dist, {_LENSES}, got {shown(value)}")
-    if _LENS.search(key) and not str(value).lower().startswith(_OURS):
+    if _LENS.search(key) and not str(value).lower().startswith(tuple(_KEYS["lenses"])):
         warnings.append(f"{name}{key} = {shown(value)} is taken for a lens {_LENSES}")
 
 

@@ -34,7 +34,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import combinations, product
 
 import numpy as np
@@ -43,7 +42,7 @@ from tqdm import tqdm
 
 from ..arrays import Floats, Ints
 from ..progress import bar
-from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, known_to
+from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, known_to, persistence
 from .calibrate import check_learnable, closed_form
 from .clocks import INSTANTS, OVERLAP, Footage, Lags, check_lags, dips, list_lags
 from .models import TRIMMED, Camera, at_once, epipolar_lines, epipolar_rows, missed, trimmed
@@ -136,11 +135,7 @@ def agrees(fit: Adjustment) -> bool:
 
     Noise of the tracks, however large, is no reason to look for other lags.
     """
-    missed = fit.misses[fit.used]
-    now, then = missed[:-1], missed[1:]
-    both = np.isfinite(now) & np.isfinite(then)
-    square = max(float(np.sum((now**2)[both])), 1e-300)
-    alike = max(float(np.sum((now * then)[both])) / square, 0.0)
+    alike = max(persistence(fit.misses[fit.used]), 0.0)
     misfit = score(fit) * np.sqrt(alike / _PERSISTENT)
     return bool(alike <= _PERSISTENT and misfit <= DISAGREEMENT and score(fit) <= GROSS)
 
@@ -245,8 +240,7 @@ def learn_lags(
     footage = Footage.of(tracks, None, rates, clocks)
     rig = posed(replace(footage, lags=first).aligned, rig, synchronous=False)
     with bar(progress, "synchronise", unit="fit") as shown:
-        found = _learned(_Videos.of(footage, rig, shown), first)
-    return found if clocks is None else replace(found, clocks=footage.clocks)
+        return replace(_learned(_Videos.of(footage, rig, shown), first), clocks=footage.uneven)
 
 
 @dataclass(frozen=True, eq=False)
@@ -371,12 +365,11 @@ def _climbed(
     best = np.array([lags[0] for lags in promising])
     fits(first)
     while True:
-        others = [(i, lag) for i in range(count) for lag in promising[i] if lag != best[i]]
-        every = [best, *(np.where(np.arange(count) == i, lag, best) for i, lag in others)]
-        winner = int(np.argmin([fits(lags) for lags in every]))
-        if winner == 0:
+        moved = ((i, lag) for i in range(count) for lag in promising[i])
+        winner = min((np.where(np.arange(count) == i, lag, best) for i, lag in moved), key=fits)
+        if fits(winner) >= fits(best):
             break
-        best = every[winner]
+        best = winner
     return _different(sorted((f for f in tried.values() if f is not None), key=score))
 
 
@@ -405,15 +398,14 @@ def _told(videos: _Videos, fit: Adjustment, first: Floats) -> Lags:
     # Lags are those of the first instant, those of the fit of the middle.
     moved = np.hstack((np.eye(count), -np.eye(count)[:, drifting[1:]] * fit.footage.middle
                        / fit.footage.span))  # fmt: skip
-    information = np.linalg.pinv(moved @ together @ moved.T, hermitian=True)
-    errors = np.sqrt(np.concatenate(([0.0], np.diag(np.linalg.pinv(information, hermitian=True)))))
+    variance = moved @ together @ moved.T
+    errors = np.sqrt(np.append(0.0, np.diag(variance)))
     # Schwarz's criterion: a fraction is one more unknown per video.
     rounded = np.rint(lags) + 0.0  # and not -0
     beside = (rounded - lags)[1:]
-    if beside @ information @ beside < count * np.log(fit.used.sum()):
+    if beside @ np.linalg.pinv(variance) @ beside < count * np.log(fit.used.sum()):
         lags = rounded
-    blurred = np.flatnonzero(errors > BLURRED)
-    warnings = [_blurred(int(i), lags) for i in blurred]
+    warnings = [_blurred(i, lags) for i in range(len(lags)) if errors[i] > BLURRED]
     if not fit.settled:
         warnings.append(
             f"the search for the lags of the videos did not converge in {fit.steps} steps: give "
@@ -455,9 +447,9 @@ class Mistake:
 
     what: str
     footage: Footage
-    lags: Lags = Lags(np.zeros(0), np.zeros(0), np.zeros(0), np.inf)
-    before: float = np.inf
-    alike: tuple[str, ...] = ()
+    lags: Lags
+    before: float
+    alike: tuple[str, ...]
 
     @property
     def text(self) -> str:
@@ -489,24 +481,19 @@ def _near(footage: Footage, rig: Rig, start: Floats) -> list[Adjustment]:
     return _fits(footage, rig, start, _paired(footage, rig.cameras)[1])
 
 
-def find_mistake(
-    tracks: Sequence[Floats],
-    rig: Rig,
-    rates: Floats,
-    clocks: Sequence[Floats] | None,
-    start: Floats,
-    names: Sequence[str],
-) -> Mistake | None:
+def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | None:
     """The one mistake without which the views agree; None if they do anyway, or with none.
 
     Parameters
     ----------
-    tracks, rig, rates, clocks, start
+    given : Footage
+        Its lags are tried first.
+    rig : Rig
         See `learn_lags`.
     names : sequence of str
         What the videos are called.
     """
-    given, found = Footage.of(tracks, None, rates, clocks), list[Mistake]()
+    start, found = given.lags, list[Mistake]()
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
         begun = _near(given, rig, start)
         left = min(map(_worst, begun), default=np.inf)
@@ -514,29 +501,30 @@ def find_mistake(
             return None
         # Whole views are not mistaken where most frames agree.
         most = min((fit.left() for fit in begun), default=np.inf) <= 2 * DISAGREEMENT
-        for kind in (partial(_dropped, start=start), *(() if most else (_whole,))):
+        for kind in (_dropped,) if most else (_dropped, _whole):
             if found and found[-1].lags.residual <= DISAGREEMENT:
                 break
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
             # none.
-            each = kind(given, rig, names)
-            ranked = [(*_paired(one.footage, rig.cameras), one) for one in each]
-            ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
-            tried = [
-                (_worst(fit), fit, one)
-                for _, best, one in ranked
-                for fit in _fits(one.footage, rig, start, best)
+            ranked = [
+                (*_paired(mended, rig.cameras), what, mended)
+                for what, mended in kind(given, rig, names)
             ]
-            for now, fit, one in sorted(tried, key=lambda one: one[0]):
+            tried = [
+                (_worst(fit), fit, what, mended)
+                for _, best, what, mended in sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
+                for fit in _fits(mended, rig, start, best)
+            ]
+            for now, fit, what, mended in sorted(tried, key=lambda one: one[0]):
                 # Times by which it has to mend the disagreement of all views together.
                 if now > GROSS or 3.0 * now >= left:
                     break
-                mended, lags = one.footage, fit.footage.lags
+                lags = fit.footage.lags
                 told = learn_lags(mended.tracks, rig, mended.rates, lags, mended.clocks)
                 if told.agree and told.residual <= 2 * DISAGREEMENT:
-                    others = [o.what for n, _, o in tried if n <= ALIKE * max(now, FINE)]
-                    alike = tuple(dict.fromkeys(o for o in others if o != one.what))
-                    found.append(replace(one, lags=told, before=left, alike=alike))
+                    others = [o for n, _, o, _ in tried if n <= ALIKE * max(now, FINE)]
+                    alike = tuple(dict.fromkeys(o for o in others if o != what))
+                    found.append(Mistake(what, mended, told, left, alike))
                     break
     return min(found, key=lambda one: one.lags.residual, default=None)
 
@@ -548,7 +536,7 @@ def _worst(fit: Adjustment) -> float:
     return max(trimmed(view, 0.5) for view in views)
 
 
-def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
+def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str, Footage]]:
     """All that change whole views: their order, their axes, and rates taken for each other."""
     count, sizes = len(names), [camera.image_size for camera in rig.cameras]
     for moved, order in _orders(count):
@@ -556,7 +544,7 @@ def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
             tracks, clocks = ([one[i] for i in order] for one in (given.tracks, given.clocks))
             how = "swapped" if len(moved) == 2 else "in another order than their cameras"
             what = f"{' and '.join(names[i] for i in moved)} {how}"
-            yield Mistake(what, Footage.of(tracks, None, given.rates[order], clocks))
+            yield what, Footage.of(tracks, None, given.rates[order], clocks)
     known = {i for i, camera in enumerate(rig.cameras) if camera.is_calibrated}
     for views in (*({i} for i in range(count)), {*range(count)}):
         told, ways = "all views", ["mirrored", "with v counted upwards"]
@@ -569,16 +557,14 @@ def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
             elif not known & views:
                 ways = [", or ".join(ways)]
         for axis, how in enumerate(ways):
-            tracks = [
-                np.where(np.arange(2) == axis, np.array(size) - 1 - track, track)
-                if i in views else track
-                for i, (track, size) in enumerate(zip(given.tracks, sizes, strict=True))
-            ]  # fmt: skip
-            yield Mistake(f"{told} {how}", Footage.of(tracks, None, given.rates, given.clocks))
+            each = enumerate(zip(given.tracks, np.array(sizes) - 1, strict=True))
+            turned = np.arange(2) == axis
+            tracks = [np.where(turned & (i in views), side - x, x) for i, (x, side) in each]
+            yield f"{told} {how}", Footage.of(tracks, None, given.rates, given.clocks)
     for i, (real, stated) in product(range(count), RATES):
         rates = np.where(np.arange(count) == i, real / stated, 1.0) * given.rates
         what = f"{names[i]} with {real} frames for {stated} that are supposed"
-        yield Mistake(what, replace(given, rates=rates / rates[0]))
+        yield what, replace(given, rates=rates / rates[0])
 
 
 def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
@@ -590,7 +576,7 @@ def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
             yield moved, order.tolist()
 
 
-def _dropped(given: Footage, rig: Rig, names: Sequence[str], start: Floats) -> Iterator[Mistake]:
+def _dropped(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str, Footage]]:
     """Videos of which frames were dropped, with the clocks by which they agree all the time."""
     length, ways = given.lengths.min(), []
     for low in _PARTS:  # in one of them none is dropped, maybe: its cameras tell when
@@ -601,7 +587,7 @@ def _dropped(given: Footage, rig: Rig, names: Sequence[str], start: Floats) -> I
         )
         if min(map(len, tracks)) > 1:
             part = Footage.of(tracks, None, given.rates, clocks)
-            ways += [_jumped(given, given, fit) for fit in _near(part, rig, start)]
+            ways += [_jumped(given, given, fit) for fit in _near(part, rig, given.lags)]
     for _ in range(3):  # as what is mended tells the cameras, and these the rest
         if not ways:
             return
@@ -615,7 +601,7 @@ def _dropped(given: Footage, rig: Rig, names: Sequence[str], start: Floats) -> I
     ]
     if told:  # of several places one may have taken a few frames of another
         about = "about " if len(told) > 1 else ""
-        yield Mistake(", ".join(about + one for one in told), found)
+        yield ", ".join(about + one for one in told), found
 
 
 def _jumped(given: Footage, mended: Footage, fit: Adjustment) -> tuple[float, Floats, Footage]:

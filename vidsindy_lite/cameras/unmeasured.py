@@ -28,12 +28,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import chain, combinations, product
+from itertools import chain, combinations, combinations_with_replacement, product
 from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import polar
 from scipy.optimize import least_squares
 
 from ..arrays import Floats
@@ -46,7 +47,6 @@ _FEWEST = 8  # frames in common of a pair
 _VIEWS = np.geomspace(2, 90, 15)  # degrees across an image: what lenses have
 _STARTS, _LAGS = 4, 10  # of all, from which a search begins
 _STEPS = 30  # of each such search
-_WIDE = 0.01  # OpenCV refuses points that are close together, in whatever unit
 _FLAT = 1e-3  # of the largest axis: what rounding leaves of a motion in a plane
 
 _EITHER_HAND = (
@@ -160,8 +160,8 @@ def _around(
     _, turn, shift, front, homogeneous = cv2.recoverPose(
         essential, *seen, centre, distanceThresh=50.0, mask=mask
     )
-    points, there = np.full((len(rays[0]), 3), np.nan), np.flatnonzero(both)[front[:, 0] > 0]
-    points[there] = (homogeneous[:3] / homogeneous[3]).T[front[:, 0] > 0]
+    points = np.full((len(rays[0]), 3), np.nan)
+    points[both] = np.where(front > 0, (homogeneous[:3] / homogeneous[3]).T, np.nan)
     poses: dict[int, _Pose] = {
         i: (np.eye(3), np.zeros(3)), j: (np.asarray(turn), np.asarray(shift)[:, 0])
     }  # fmt: skip
@@ -169,17 +169,16 @@ def _around(
         told = np.isfinite(points).all(axis=1) & np.isfinite(rays[k]).all(axis=1)
         if told.sum() < _FEWEST:
             return
-        wide = _WIDE * float(np.ptp(points[told], axis=0).max())
         try:
             done, axis, place, _ = cv2.solvePnPRansac(
-                points[told] / wide, rays[k][told], centre, None, flags=cv2.SOLVEPNP_SQPNP,
+                points[told], rays[k][told], centre, None, flags=cv2.SOLVEPNP_SQPNP,
                 reprojectionError=3 * GROSS / cameras[k].focal_length,
             )  # fmt: skip
         except cv2.error:  # points of one draw lie too close together
             return
         if not done:
             return
-        poses[k] = np.asarray(cv2.Rodrigues(axis)[0]), wide * np.asarray(place)[:, 0]
+        poses[k] = np.asarray(cv2.Rodrigues(axis)[0]), np.asarray(place)[:, 0]
     yield [poses[k] for k in sorted(poses)]
 
 
@@ -199,16 +198,17 @@ def _far_away(
     sizes = np.linalg.norm(motion, axis=(1, 2), keepdims=True)
     if not sizes.all():  # nothing moves in some view
         return
-    up = np.triu_indices(3)
-    twice = 2 - np.eye(3)[up]  # what is off the diagonal stands there twice
-    equations = []
-    for one, other in motion / sizes:
-        crossed = np.outer(one, other) + np.outer(other, one)
-        unlike = np.outer(one, one) - np.outer(other, other)
-        equations += [crossed[up] * twice, unlike[up] * twice]
-    q = np.zeros((3, 3))
-    q[up] = np.linalg.svd(np.array(equations))[2][-1]
-    values, axes = np.linalg.eigh(q + np.triu(q, 1).T)
+    one, other = (motion / sizes).swapaxes(0, 1)
+    pairs = combinations_with_replacement(np.eye(3), 2)
+    basis = np.array([np.outer(a, b) + np.outer(b, a) for a, b in pairs])  # of such Q
+
+    def form(left: Floats, right: Floats) -> Floats:
+        """left' Q right of each camera, as a function of the parts of Q."""
+        return np.einsum("mi,kij,mj->mk", left, basis, right)
+
+    equations = np.vstack((form(one, other), form(one, one) - form(other, other)))
+    q = np.tensordot(np.linalg.svd(equations)[2][-1], basis, axes=1)
+    values, axes = np.linalg.eigh(q)
     values = values * np.sign(values.sum())
     root = axes * np.sqrt(np.maximum(values, _FLAT * values.max()))
     for mirror in ([1, 1, 1], [1, 1, -1]):
@@ -216,9 +216,8 @@ def _far_away(
         for rows, camera, centre in zip(
             motion @ root * mirror, cameras, middle.reshape(-1, 2), strict=True
         ):
-            turned, lengths, back = np.linalg.svd(rows, full_matrices=False)
-            right, down = turned @ back
-            shift = np.append(centre, camera.focal_length) / lengths.mean()
+            (right, down), stretch = polar(rows, side="left")
+            shift = np.append(centre, camera.focal_length) / (np.trace(stretch) / 2)
             poses.append((np.array([right, down, np.cross(right, down)]), shift))
         yield poses
 
@@ -287,48 +286,39 @@ class Factorised(NamedTuple):
     moving: int
 
 
-def factorised(
-    tracks: Sequence[Floats],
-    rig: Rig,
-    rates: Floats,
-    clocks: Sequence[Floats] | None,
-    lags: Floats | None = None,
-) -> Factorised | None:
+def factorised(films: Footage, rig: Rig, synchronous: bool = False) -> Factorised | None:
     """Cameras of which nothing is known as affine maps; None if no lags make the views agree.
 
     Parameters
     ----------
-    tracks : sequence of ndarray, shape (n_i, 2)
-        One per camera, NaN where the target was not seen.
+    films : Footage
     rig : Rig
         See `Rig.is_measured`; of its cameras the sizes of the images count.
-    rates, clocks, lags
-        See `align`; lags are found if they are not given.
+    synchronous : bool
+        Whether the lags are those of the footage; they are found if not.
     """
-    films = Footage.of(tracks, None, rates, clocks)
-    some, ranks, every = films.some, range(1, 4), range(len(tracks))
-    found = [_best(some, rank, lags) for rank in ranks]
+    count, ranks = len(films.curves), range(1, 4)
+    found = [_best(films.some, rank, synchronous) for rank in ranks]
     enough = max(BETTER * found[-1][0], FINE)
     rank = next(rank for rank, (left, *_) in zip(ranks, found, strict=True) if left <= enough)
     left, best, errors = found[rank - 1]
     if not np.isfinite(left):
         return None
-    images = _images(films, best, every)
+    images = _images(films, best, range(count))
     moved, missed = (
-        np.nanmean((_beyond(images, r) ** 2).reshape(-1, len(tracks), 2), axis=(0, 2))
-        for r in (0, rank)
+        np.nanmean((_beyond(images, r) ** 2).reshape(-1, count, 2), axis=(0, 2)) for r in (0, rank)
     )
     # Times what is left by which a target must move, rms, in every view.
     if not (moved > 5.0**2 * missed).all():
         return None
     middle, _, axes = _spread(images)
-    downs = np.split(np.sqrt(len(tracks)) * axes[:3].T, len(tracks))
-    places, sizes = np.split(middle, len(tracks)), [camera.image_size for camera in rig.cameras]
+    downs = np.split(np.sqrt(count) * axes[:3].T, count)
+    places, sizes = np.split(middle, count), [camera.image_size for camera in rig.cameras]
     cameras = tuple(map(AffineCamera.of, downs, places, sizes))
     doubts = () if left <= GROSS else (
         f"views agree on one motion but for {left:.2g} pixels of noise: look at the tracks",
     )  # fmt: skip
-    told = Lags(best, rates, errors, left, doubts, clocks=films.clocks if clocks else ())
+    told = Lags(best, films.rates, errors, left, doubts, clocks=films.uneven)
     return Factorised(Rig(cameras, note=_NOTE), told, rank)
 
 
@@ -347,18 +337,18 @@ def _left(footage: Footage, lags: Floats, places: Sequence[int], rank: int) -> f
     return float(np.sqrt(np.nansum(beyond**2) / (count * (width - rank))))
 
 
-def _best(footage: Footage, rank: int, given: Floats | None) -> tuple[float, Floats, Floats]:
+def _best(footage: Footage, rank: int, synchronous: bool) -> tuple[float, Floats, Floats]:
     """What the lags leave beyond a rank that leave least, those lags, and their errors.
 
-    Unless they are given.
+    Unless they are known.
     Of two views, lags are promising that leave less than their neighbours; of three, these are
     tried together, and further views one by one. Of those that leave about as little, the
     shortest count.
     """
     count = len(footage.curves)
     lags = np.zeros(count)
-    if given is not None:
-        return _left(footage, given, range(count), rank), given, lags
+    if synchronous:
+        return _left(footage, footage.lags, range(count), rank), footage.lags, lags
     promising = [_promising(footage, i, rank)[:_PROMISING] or [0.0] for i in range(1, count)]
     for last in range(3, count + 1):
         tried = []
