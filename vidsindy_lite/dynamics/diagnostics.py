@@ -21,7 +21,7 @@ from ..arrays import Bools, Floats, Ints
 from .collocation import CLEANEST, Fit, Linearisation, State, Status
 from .data import Trajectory, autocovariances, typical_step
 from .frames import closed, free_offsets, laws_at
-from .l0 import LEAST, far_neighbours, newcomers, prior_penalties
+from .l0 import LEAST, STRONG, far_neighbours, newcomers, prior_penalties
 from .library import (
     monomial_exponents,
     monomials,
@@ -570,8 +570,7 @@ def pinned(
         cost = float(np.log((high - low)[axis] ** 2 / (2 * np.pi * variance)) - place**2 / variance)
         moved = forth @ rate
         new = (np.abs(moved) > FAINT * np.abs(moved).max(initial=0.0)) & ~law.support
-        # Odds of 20 to 1: strong evidence by Kass and Raftery 1995.
-        if new.any() and cost < 6.0:
+        if new.any() and cost < STRONG:
             yield "another origin", problem.form.names[axis], cost
 
 
@@ -861,11 +860,11 @@ def _changing(problem: Problem, fit: Fit, tolerated: float, most: int = 8) -> It
         )
 
 
-def _far_neighbours(wider: Wider, remedy: str, odds_allowed: float = 0.05) -> Iterator[str]:
+def _far_neighbours(wider: Wider, remedy: str) -> Iterator[str]:
     """Has another law that may as well be true coefficients far from those of this one?
 
-    Unless the odds against it are 20 to 1 (strong evidence, as in `pinned`). The axes stay as they
-    are: the same law in another frame would count.
+    Unless the evidence against it is strong. The axes stay as they are: the same law in another
+    frame would count.
     """
     law, columns = wider.problem.law(wider.fit.state), wider.problem.form.searched
     support, present = wider.fit.state.free()[columns], wider.fit.state.flat()[columns]
@@ -876,7 +875,7 @@ def _far_neighbours(wider: Wider, remedy: str, odds_allowed: float = 0.05) -> It
     odds, dropped, added, entry, value = far_neighbours(
         model.information, model.gradient, present, penalties, support
     )
-    if odds > odds_allowed:
+    if odds > np.exp(-STRONG / 2):
         out, into = (place(law, columns[k]) if k >= 0 else "" for k in (dropped, added))
         change = f"{into} instead of {out}" if out and into else f"with {into}" if into else ""
         change = change or f"without {out}"

@@ -23,6 +23,8 @@ COLLINEAR = 1e-9
 """Share of a column that is not a combination of others, below which it is taken to be one."""
 NEGLIGIBLE = 1e-6
 """Changes of the function below this are taken for rounding."""
+STRONG = 6.0
+"""Twice the log of odds of 20 to 1: strong evidence for one of two laws (Kass, Raftery 1995)."""
 FAR = 4.0
 """Standard errors of a coefficient beyond which another law has another coefficient."""
 LEAST = 1e-300

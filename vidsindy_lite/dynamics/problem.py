@@ -12,12 +12,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import BSpline
-from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.interpolate import BSpline, make_lsq_spline
 from scipy.special import chdtri
 
 from ..arrays import Bools, Floats, Ints
-from .bspline import DEGREE, PENALTIES, WIDTH, Segment, basis, normal_band, smooth
+from .bspline import DEGREE, PENALTIES, Segment, smooth
 from .collocation import CLEANEST, Collocation, Fit, State, Status, WithCurve
 from .data import Trajectory, Units, cut, typical_step, typical_steps
 from .l0 import LEAST
@@ -270,9 +269,8 @@ def fit_curves(collocation: Collocation, curves: Sequence[Callable[[Floats], Flo
     for segment, curve in zip(collocation.segments, curves, strict=True):
         b = segment.breakpoints
         dense = np.append((b[:-1, None] + np.diff(b)[:, None] * np.arange(4) / 4).ravel(), b[-1])
-        rows = basis([segment.knots], np.array([0, len(segment.knots) - WIDTH]), [dense])
-        factor = cholesky_banded(normal_band(rows), lower=True)
-        control.append(cho_solve_banded((factor, True), rows.T @ curve(dense)))
+        spline = make_lsq_spline(dense, curve(dense), segment.knots, DEGREE, method="norm-eq")
+        control.append(spline.c)
     return np.concatenate(control)
 
 
