@@ -397,24 +397,18 @@ class Wider:
         With all of these as candidates; its penalties are those of the library alone.
     fit : Fit
         With the old terms alone.
-    old : int
-        How many terms the library has.
+    further : ndarray of int
+        Places in the coefficients, equation by equation, of terms that the library has not.
     """
 
     problem: Problem
     fit: Fit
-    old: int
+    further: Ints
 
     @cached_property
     def model(self) -> Linearisation:
         """The quadratic model around the fit, in all candidates and moving axes."""
         return self.problem.model(self.fit)
-
-    @cached_property
-    def further(self) -> Ints:
-        """Places in the coefficients, equation by equation, of terms that the library has not."""
-        searched = self.problem.form.searched
-        return searched[searched % len(self.problem.exponents) >= self.old]
 
     @cached_property
     def beyond(self) -> Beyond:
@@ -465,13 +459,13 @@ def widened(problem: Problem, fit: Fit, budget: float = 5e6) -> Wider:
         form, exponents=exponents, candidates=candidates, known=padded(form.known),
         shared=shared.ravel(),
     )  # fmt: skip
-    wider = Wider(replace(problem, form=form), fit, size)
+    new = form.searched % len(exponents) >= size
+    wider = Wider(replace(problem, form=form), fit, form.searched[new])
     if form.functions:
-        old = np.setdiff1d(form.searched, wider.further)
-        model = wider.model.of(np.append(old, wider.further))
-        _, variance = newcomers(model.information, model.gradient, len(old))
+        model = wider.model.of(np.append(form.searched[~new], wider.further))
+        _, variance = newcomers(model.information, model.gradient, int((~new).sum()))
         candidates.T.flat[wider.further[~np.isfinite(variance)]] = False
-        wider = Wider(wider.problem, fit, size)
+        wider = replace(wider, further=wider.further[np.isfinite(variance)])
     return wider
 
 
@@ -637,10 +631,9 @@ def _met(problem: Problem, fit: Fit) -> list[Bools]:
     """Through which samples of each trajectory the curve of a law passes, as far as noise tells."""
     grid = fit.collocation.grid
     apart = np.abs(fit.collocation.curve(fit.state.control_points) - grid.x)
-    near = ~(apart > GROSS * residual_noise(fit)).any(axis=1)
+    near = np.asarray(~(apart > GROSS * residual_noise(fit)).any(axis=1))
     found = [np.zeros(len(t), dtype=bool) for t, _ in problem.trajectories]
-    ends = np.cumsum([len(segment.t) for segment in grid.segments])[:-1]
-    for segment, rows in zip(grid.segments, np.split(near, ends), strict=True):
+    for segment, rows in zip(grid.segments, grid.split(near), strict=True):
         times = problem.trajectories[segment.trajectory][0]
         found[segment.trajectory][np.searchsorted(times, segment.t)] = rows
     return found
@@ -737,7 +730,7 @@ def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:
 
 
 def _unmet(problem: Problem, fit: Fit, law: PolynomialSystem, remedy: str) -> Iterator[str]:
-    """Is the fit no minimum, does the curve not obey the law, or have its two frames two laws?
+    """Is the fit no minimum, or have the law's two frames two laws?
 
     The last may be apart by a fifth of the speed: terms that cannot be told from zero make less.
     """
@@ -749,12 +742,6 @@ def _unmet(problem: Problem, fit: Fit, law: PolynomialSystem, remedy: str) -> It
         yield (
             f"the last fit did not converge ({fit.status.value}): {meaning}; use {remedy}, or a "
             "lower degree"
-        )
-    residual = float(np.sqrt((fit.collocation.physics_residual(fit.state) ** 2).mean()))
-    if not residual < max(1e-2, 2 * float(problem.process_noise.max())):
-        yield (
-            f"the law is not met along the curve (residual {residual:.2g} of the speed): the fit "
-            f"did not converge; use {remedy}, or another degree"
         )
     units, (x, _) = problem.units, fit.collocation.node_states(fit.state.control_points)
     native = problem.law(fit.state)(x - fit.state.offset)

@@ -192,16 +192,6 @@ def monomials(x: Floats, exponents: Ints) -> Floats:
     return values.T
 
 
-def monomial_gradients(x: Floats, exponents: Ints) -> Floats:
-    """Derivatives of monomials, shape (n, l, d); see `monomials`."""
-    gradients = []
-    for i in range(x.shape[1]):
-        lowered = exponents.copy()
-        lowered[:, i] = np.maximum(lowered[:, i] - 1, 0)
-        gradients.append(exponents[:, i] * monomials(x, lowered))
-    return np.stack(gradients, axis=-1)
-
-
 def shift_matrix(exponents: Ints, offset: Floats, rows: Ints | slice = slice(None)) -> Floats:
     """Matrix ``S`` with ``phi(x - offset) = phi(x) S``, shape (l, l), or some rows of it.
 
@@ -227,6 +217,11 @@ def closure(exponents: Ints) -> Ints:
     divisors = {divisor for powers in exponents for divisor in np.ndindex(*(powers + 1))}
     ordered = sorted(divisors, key=lambda e: (sum(e), tuple(-p for p in e)))
     return np.array(ordered, dtype=int).reshape(-1, exponents.shape[1])
+
+
+def places_of(wanted: Ints, exponents: Ints) -> Ints:
+    """In which row of exponents each of the wanted monomials stands, which all are there."""
+    return (wanted[:, None] == exponents).all(axis=-1).argmax(axis=1)
 
 
 def divides(exponents: Ints, axes: Bools | None = None) -> Bools:

@@ -70,11 +70,11 @@ def _errors_seen(fit: Fit) -> list[list[Floats]]:
     collocation = fit.collocation
     residual, _ = collocation.data_residual(fit.state.control_points)
     residual *= np.sqrt(collocation.precision)
-    seen = np.isfinite(collocation.grid.x)
-    ends = np.cumsum([len(segment.t) for segment in collocation.segments])[:-1]
-    stretches = list(zip(np.split(residual, ends), np.split(seen, ends), strict=True))
+    residual[np.isnan(collocation.grid.x)] = np.nan
+    stretches = collocation.grid.split(residual)
     return [
-        [errors[here[:, j], j, None] for errors, here in stretches] for j in range(collocation.d)
+        [errors[~np.isnan(errors[:, j]), j, None] for errors in stretches]
+        for j in range(collocation.d)
     ]
 
 

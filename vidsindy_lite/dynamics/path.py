@@ -77,7 +77,6 @@ def follow(problem: Problem, fit: Fit) -> Path:
     """
     model = problem.model(fit)
     columns = model.columns
-    penalties = np.append(problem.entry_penalties, np.full(problem.d, -np.inf))[columns]
     present, support = fit.state.flat()[columns], fit.state.free()[columns]
     own = typical(np.maximum(fit.collocation.data_weights**-0.5, problem.process_noise))
     single = np.full(problem.d, own) if problem.has_process_noise else residual_noise(fit)
@@ -94,7 +93,7 @@ def follow(problem: Problem, fit: Fit) -> Path:
     functions = [
         (m.information, m.gradient, share) for m, share in zip(tolerating, shares, strict=True)
     ]
-    searched = subset_path(functions, present, penalties, support)
+    searched = subset_path(functions, present, problem.costs(columns), support)
     flat = np.zeros((len(searched), problem.form.candidates.size), dtype=bool)
     flat[:, problem.form.searched] = np.array(searched)[:, : len(problem.form.searched)]
     laws = flat[:, problem.form.shared].reshape(len(flat), problem.d, -1)
@@ -157,13 +156,12 @@ def select(problem: Problem, start: Fit, weight: float, stage: str, history: His
 
     best = refit(start.state)
     history.add(stage, problem, best, weight)
-    penalties = np.append(problem.entry_penalties, np.full(problem.d, -np.inf))
     for _ in range(LONGEST_SEARCH):
         state = best.state
         columns = problem.columns(state)
         model = weighted.linearise(state, columns)
         support, solution, _ = subset_search(
-            model.information, model.gradient, state.flat()[columns], penalties[columns],
+            model.information, model.gradient, state.flat()[columns], problem.costs(columns),
             state.free()[columns],
         )  # fmt: skip
         if (support == state.free()[columns]).all():

@@ -138,6 +138,10 @@ class Problem:
         equations = self.measured[0][1].shape[1]
         return replace(self, penalties=term_penalties(self.exponents, equations, SURE))
 
+    def costs(self, columns: Ints) -> Floats:
+        """Penalties of entries of `State.flat` in a search in which no axis is dropped."""
+        return np.append(self.entry_penalties, np.full(self.d, -np.inf))[columns]
+
     def columns(self, state: State) -> Ints:
         """Entries of `State.flat` that may differ from zero: candidates and moving axes."""
         size = self.form.candidates.size
