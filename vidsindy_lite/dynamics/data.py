@@ -275,13 +275,10 @@ def typical_step(trajectories: Sequence[Trajectory]) -> float:
 
 def typical_steps(trajectories: Sequence[Trajectory]) -> Floats:
     """The same of each coordinate over that of all samples, (d,): 1 if it is seen in all."""
-    steps, whole = np.ones(trajectories[0][1].shape[1]), typical_step(trajectories)
-    for j in range(len(steps)):
-        seen = [np.isfinite(x[:, j]) for _, x in trajectories]
-        if not np.concatenate(seen).all():
-            own = [(t[rows], x[rows]) for (t, x), rows in zip(trajectories, seen, strict=True)]
-            steps[j] = typical_step(own) / whole
-    return steps
+    coordinates = range(trajectories[0][1].shape[1])
+    times = [[t[np.isfinite(x[:, j])] for t, x in trajectories] for j in coordinates]
+    own = [np.median(np.concatenate([np.diff(t) for t in parts])) for parts in times]
+    return np.array(own) / typical_step(trajectories)
 
 
 # --------------------------------------------------------------------------------------------------

@@ -69,9 +69,7 @@ def subset_search(
     """
     model = _Quadratic.of(information, gradient, present, penalty)
     best = _search(model, start)
-    solution = np.zeros(len(penalty))
-    solution[best.inside] = best.fitted * model.scale[best.inside]
-    return best.support, solution, model.value(best)
+    return best.support, model.solution(best), model.value(best)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of columns that are all but combinations
@@ -133,9 +131,7 @@ def closest_rival(
 def minimiser(information: Floats, gradient: Floats, present: Floats, support: Bools) -> Floats:
     """Minimiser of the function of `subset_search` on a support, zero elsewhere, shape (m,)."""
     model = _Quadratic.of(information, gradient, present, np.zeros(len(present)))
-    fit, solution = model.fit(support), np.zeros(len(present))
-    solution[fit.inside] = fit.fitted * model.scale[fit.inside]
-    return solution
+    return model.solution(model.fit(support))
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,6 +223,12 @@ class _Quadratic:
         if (key := support.tobytes()) not in self.fits:
             self.fits[key] = self._fitted(support)
         return self.fits[key]
+
+    def solution(self, fit: _Fit) -> Floats:
+        """The minimiser, zero outside of the support, in units of its own entries."""
+        solution = np.zeros(len(self.scale))
+        solution[fit.inside] = fit.fitted * self.scale[fit.inside]
+        return solution
 
     def _fitted(self, support: Bools) -> _Fit:
         inside = np.flatnonzero(support)
