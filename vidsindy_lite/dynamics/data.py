@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..checks import FARTHEST, check_array, check_times, shown
+from ..checks import FARTHEST, check_array, check_items, check_times, shown
 
 # --------------------------------------------------------------------------------------------------
 # Measured trajectories: checked input, and its cut into stretches without gaps.
@@ -174,10 +174,7 @@ def check_sigma(
         return None
     several = len(trajectories) > 1 and isinstance(sigma, list | tuple)
     given = cast("Sequence[Floats]", sigma if several else [sigma] * len(trajectories))
-    if len(given) != len(trajectories):
-        raise ValueError(
-            f"sigma: must be one per trajectory ({len(trajectories)}), got {len(given)}"
-        )
+    check_items("sigma", given, len(trajectories), "trajectory")
     checked = []
     for part, t, (seen, x) in zip(given, times, trajectories, strict=True):
         errors, shape = check_array("sigma", part), (len(t), x.shape[1])
@@ -223,10 +220,7 @@ def check_systematic(
         raise ValueError(f"systematic: must have shape (k, n, d), got {shown(systematic)}")
     alone = len(trajectories) == 1 and not (len(systematic) == 1 and np.ndim(systematic[0]) == 3)
     parts = [systematic] if alone else systematic
-    if len(parts) != len(trajectories):
-        raise ValueError(
-            f"systematic: must be one array per trajectory ({len(trajectories)}), got {len(parts)}"
-        )
+    check_items("systematic", parts, len(trajectories), "trajectory")
     checked = []
     for part, t, (seen, x) in zip(parts, times, trajectories, strict=True):
         part = check_array("systematic", part)

@@ -24,6 +24,7 @@ from ..checks import (
     check_choice,
     check_instance,
     check_integer,
+    check_items,
     check_number,
     check_times,
     shown,
@@ -284,10 +285,7 @@ class Input:
         several = isinstance(t, list | tuple) and any(np.ndim(part) for part in t)
         times = cast("Sequence[Floats]", t if several else [t])
         runs = cast("Sequence[Floats]", values if several else [values])
-        if len(runs) != len(times):
-            raise ValueError(
-                f"inputs: {name} must be one per trajectory ({len(times)}), got {len(runs)}"
-            )
+        check_items(f"inputs: {name}", runs, len(times), "trajectory")
         found = [_curve(name, part, run, hold) for part, run in zip(times, runs, strict=True)]
         pieces = [curve for curve, _ in found]
         ends = sorted((spline.x[0], spline.x[-1]) for spline in pieces)
@@ -447,10 +445,7 @@ class Library:
         ValueError
             If it is no such mapping.
         """
-        if not isinstance(functions, Mapping) or not functions:
-            raise ValueError(
-                f"functions: must map names to functions of the variables, got {shown(functions)}"
-            )
+        check_mapping("functions", functions, "map names to functions of the variables")
         for name, rule in functions.items():
             if not isinstance(name, str) or not name.strip() or not callable(rule):
                 raise ValueError(
@@ -497,8 +492,7 @@ class Library:
         >>> library = vl.Library.polynomial(3) + vl.Library.inputs(t, {"u": u})
         >>> vl.discover(t, x, library=library, order=2)  # x'' = -x - x^3 - 0.2 vx + 0.5 u
         """
-        if not isinstance(values, Mapping) or not values:
-            raise ValueError(f"inputs: must map names to values at t, got {shown(values)}")
+        check_mapping("inputs", values, "map names to values at t")
         if hold is not None:
             check_choice("hold", hold, ("zero", "linear", "cubic"))
         return cls.terms({name: Input.of(name, t, given, hold) for name, given in values.items()})
@@ -529,13 +523,10 @@ class Library:
         >>> vl.Library.polynomial(2).where(known | forbidden)
         """
         rows = {name: dict(terms) for name, terms in self.given}
-        given = equations.items() if isinstance(equations, Mapping) else ()
-        if not given or not all(isinstance(terms, Mapping) for _, terms in given):
-            raise ValueError(
-                "equations: must give variables what is known of their terms, e.g. "
-                f"{{'x': {{'y': 10, 'z': 0}}}}, got {shown(equations)}"
-            )
-        for name, terms in given:
+        example = "{'x': {'y': 10, 'z': 0}}"
+        rule = f"give variables what is known of their terms, e.g. {example}"
+        check_mapping("equations", equations, rule, Mapping)
+        for name, terms in equations.items():
             checked = {
                 term: None if value is None else check_number(f"coefficient of {term}", value)
                 for term, value in terms.items()
@@ -693,6 +684,13 @@ def check_library(degree: int | None, library: Library | None) -> Library:
     if library == Library():
         raise ValueError("library: must hold a term, got none")
     return library
+
+
+def check_mapping(name: str, value: object, rule: str, of: type = object) -> None:
+    """A mapping that is not empty, of values of a type."""
+    rows = value.values() if isinstance(value, Mapping) else ()
+    if not rows or not all(isinstance(row, of) for row in rows):
+        raise ValueError(f"{name}: must {rule}, got {shown(value)}")
 
 
 def harmonic(names: tuple[str, ...], axis: int, multiple: int, kind: str) -> Function:

@@ -32,6 +32,7 @@ from .library import (
     Function,
     Library,
     along_state,
+    check_mapping,
     closure,
     extended,
     law_variables,
@@ -317,12 +318,9 @@ class PolynomialSystem:
             If the equations are no such mapping, or a term names an unknown variable or has a
             higher degree than the library.
         """
-        given = equations.values() if isinstance(equations, Mapping) else ()
-        if not given or not all(isinstance(terms, Mapping) for terms in given):
-            raise ValueError(
-                "equations: must give each variable its terms, e.g. {'x': {'x': -10, 'y': 10}, "
-                f"'y': {{'x': 1}}}}, got {shown(equations)}"
-            )
+        example = "{'x': {'x': -10, 'y': 10}, 'y': {'x': 1}}"
+        rule = f"give each variable its terms, e.g. {example}"
+        check_mapping("equations", equations, rule, Mapping)
         names, held = tuple(equations), Library() if library is None else library
         check_instance("library", held, Library)
         states = names[:-1] if CLOCK in names[-1:] and held.timed(names[:-1]) else names
@@ -333,7 +331,7 @@ class PolynomialSystem:
         known += tuple(f"{name}'" for name in names if held.denominators)
         parsed = [
             (parse_term(term, known), column, check_number(f"coefficient of {term}", value))
-            for column, terms in enumerate(given)
+            for column, terms in enumerate(equations.values())
             for term, value in terms.items()
         ]
         highest = max((sum(powers) for powers, _, _ in parsed), default=0)
