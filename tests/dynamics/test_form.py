@@ -278,7 +278,7 @@ RUNS, CURVE = [(T, X), (T, X)], np.ones((2, 200, 2))
             {"sigma": [0.1] * 3},
             r"sigma: must be .*, or have shape \(2,\) or \(200, 2\), got \(3,\)",
         ),
-        ({"t": RUNS, "x": None, "sigma": [0.1] * 3}, "sigma: must be one per trajectory, got 3 for 2"),
+        ({"t": RUNS, "x": None, "sigma": [0.1] * 3}, "sigma: must be one per .*, got 3 for 2"),
         ({"origin": "here"}, "origin: must be one of learn, data, got 'here'"),
         ({"t": [(T, X), (T, X * [1, np.nan])], "x": None}, "in all trajectories or in none, got c"),
         ({"t": [(T, frame("a", "b")), (T, frame("b", "a"))], "x": None}, "must be named alike in"),
