@@ -260,7 +260,7 @@ def persistent(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path,
     return fit, path, fit.status is Status.CONVERGED and has_terms(fit, path.widest())
 
 
-def near(problem: Problem, fit: Fit, tolerated: float) -> bool:
+def near(problem: Problem, fit: Fit, tolerated: float = 0.0) -> bool:
     """Whether a law leaves hardly more than the noise, or than is tolerated."""
     limit = CONSISTENT * np.maximum(problem.noise, tolerated)
     return bool((errors_left(problem, fit) <= limit).all())
@@ -282,7 +282,7 @@ def deepest(
     """
     for _ in range(most):
         errors = errors_left(problem, path.fit)
-        if near(problem, path.fit, 0.0) or history.over:
+        if near(problem, path.fit) or history.over:
             break
         tolerant = replace(problem, noise=np.maximum(problem.noise, errors / descent))
         collocation = path.fit.collocation
