@@ -207,13 +207,7 @@ def _factors(residual: Floats, causes: list[Floats]) -> Floats:
     if not cost < plain - LIKELY or gross.mean() > 0.1:  # if so many are wrong, the law is
         return even
     precision = np.minimum(np.median(variance) / variance, LARGEST_RATIO)
-    return np.where(gross & _alone(residual), 0.0, precision)
-
-
-def _alone(residual: Floats) -> Bools:
-    """Which residuals are more than twice those around them, (n,)."""
-    around = np.stack([np.roll(residual, k) for k in (-2, -1, 1, 2)])
-    return np.abs(residual) > 2 * np.abs(np.median(around, axis=0))
+    return np.where(gross, 0.0, precision)
 
 
 def _variance(residual: Floats, causes: Floats, updates: int = 60) -> tuple[float, Floats, Bools]:
