@@ -222,7 +222,8 @@ def closure(exponents: Ints) -> Ints:
 
 def places_of(wanted: Ints, exponents: Ints) -> Ints:
     """In which row of exponents each of the wanted monomials stands, which all are there."""
-    return (wanted[:, None] == exponents).all(axis=-1).argmax(axis=1)
+    row = {tuple(powers): k for k, powers in enumerate(exponents.tolist())}
+    return np.array([row[tuple(powers)] for powers in wanted.tolist()], dtype=int)
 
 
 def divides(exponents: Ints, axes: Bools | None = None) -> Bools:
