@@ -169,7 +169,7 @@ def test_the_progress_bar_knows_its_end(monkeypatch):
     monkeypatch.setattr(solver, "bar", lambda asked, label, **how: Bar(desc=label, **how))
     t = np.linspace(0, 12, 200)
     discover(t, np.stack([np.sin(t), np.cos(t)], axis=1), degree=1, progress=True)
-    end = 3 * (1 + solver.ROUNDS)
+    end = 2 * (1 + solver.ROUNDS)
     assert bars[0] == (end, end)
 
 

@@ -10,8 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
@@ -92,10 +94,7 @@ def local_basis(knots: Floats, t: Floats, order: int = 0) -> tuple[Ints, Floats]
 
 def design_matrix(knots: Floats, t: Floats, order: int = 0) -> Floats:
     """Dense matrix of shape (n, r): ``G`` for order 0, ``dG/dt`` for order 1; see `local_basis`."""
-    first, values = local_basis(knots, t, order)
-    dense = np.zeros((len(t), len(knots) - WIDTH))
-    np.put_along_axis(dense, first[:, None] + np.arange(WIDTH), values, axis=1)
-    return dense
+    return basis([knots], np.array([0, len(knots) - WIDTH]), [t], order).toarray()
 
 
 @dataclass(frozen=True)
@@ -224,6 +223,10 @@ class Grid:
         """The trajectory to which each node belongs, (k,)."""
         segments = np.searchsorted(self.starts, self.nodes.indices[::WIDTH], side="right") - 1
         return np.array([segment.trajectory for segment in self.segments])[segments]
+
+    def split(self, values: NDArray[Any]) -> list[NDArray[Any]]:
+        """What is given for all samples, (n, ...), segment by segment."""
+        return np.split(values, np.cumsum([len(segment.t) for segment in self.segments])[:-1])
 
     @property
     def r(self) -> int:

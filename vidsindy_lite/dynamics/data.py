@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..checks import FARTHEST, check_array, check_times, shown
+from ..checks import FARTHEST, check_array, check_items, check_times, shown
 
 # --------------------------------------------------------------------------------------------------
 # Measured trajectories: checked input, and its cut into stretches without gaps.
@@ -174,10 +174,7 @@ def check_sigma(
         return None
     several = len(trajectories) > 1 and isinstance(sigma, list | tuple)
     given = cast("Sequence[Floats]", sigma if several else [sigma] * len(trajectories))
-    if len(given) != len(trajectories):
-        raise ValueError(
-            f"sigma: must be one per trajectory ({len(trajectories)}), got {len(given)}"
-        )
+    check_items("sigma", given, len(trajectories), "trajectory")
     checked = []
     for part, t, (seen, x) in zip(given, times, trajectories, strict=True):
         errors, shape = check_array("sigma", part), (len(t), x.shape[1])
@@ -223,10 +220,7 @@ def check_systematic(
         raise ValueError(f"systematic: must have shape (k, n, d), got {shown(systematic)}")
     alone = len(trajectories) == 1 and not (len(systematic) == 1 and np.ndim(systematic[0]) == 3)
     parts = [systematic] if alone else systematic
-    if len(parts) != len(trajectories):
-        raise ValueError(
-            f"systematic: must be one array per trajectory ({len(trajectories)}), got {len(parts)}"
-        )
+    check_items("systematic", parts, len(trajectories), "trajectory")
     checked = []
     for part, t, (seen, x) in zip(parts, times, trajectories, strict=True):
         part = check_array("systematic", part)
@@ -275,13 +269,10 @@ def typical_step(trajectories: Sequence[Trajectory]) -> float:
 
 def typical_steps(trajectories: Sequence[Trajectory]) -> Floats:
     """The same of each coordinate over that of all samples, (d,): 1 if it is seen in all."""
-    steps, whole = np.ones(trajectories[0][1].shape[1]), typical_step(trajectories)
-    for j in range(len(steps)):
-        seen = [np.isfinite(x[:, j]) for _, x in trajectories]
-        if not np.concatenate(seen).all():
-            own = [(t[rows], x[rows]) for (t, x), rows in zip(trajectories, seen, strict=True)]
-            steps[j] = typical_step(own) / whole
-    return steps
+    coordinates = range(trajectories[0][1].shape[1])
+    times = [[t[np.isfinite(x[:, j])] for t, x in trajectories] for j in coordinates]
+    own = [np.median(np.concatenate([np.diff(t) for t in parts])) for parts in times]
+    return np.array(own) / typical_step(trajectories)
 
 
 # --------------------------------------------------------------------------------------------------

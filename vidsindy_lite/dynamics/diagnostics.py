@@ -21,7 +21,7 @@ from ..arrays import Bools, Floats, Ints
 from .collocation import CLEANEST, Fit, Linearisation, State, Status
 from .data import Trajectory, autocovariances, typical_step
 from .frames import closed, free_offsets, laws_at
-from .l0 import LEAST, far_neighbours, newcomers, prior_penalties
+from .l0 import LEAST, STRONG, far_neighbours, newcomers, prior_penalties
 from .library import (
     monomial_exponents,
     monomials,
@@ -397,24 +397,18 @@ class Wider:
         With all of these as candidates; its penalties are those of the library alone.
     fit : Fit
         With the old terms alone.
-    old : int
-        How many terms the library has.
+    further : ndarray of int
+        Places in the coefficients, equation by equation, of terms that the library has not.
     """
 
     problem: Problem
     fit: Fit
-    old: int
+    further: Ints
 
     @cached_property
     def model(self) -> Linearisation:
         """The quadratic model around the fit, in all candidates and moving axes."""
         return self.problem.model(self.fit)
-
-    @cached_property
-    def further(self) -> Ints:
-        """Places in the coefficients, equation by equation, of terms that the library has not."""
-        searched = self.problem.form.searched
-        return searched[searched % len(self.problem.exponents) >= self.old]
 
     @cached_property
     def beyond(self) -> Beyond:
@@ -465,13 +459,13 @@ def widened(problem: Problem, fit: Fit, budget: float = 5e6) -> Wider:
         form, exponents=exponents, candidates=candidates, known=padded(form.known),
         shared=shared.ravel(),
     )  # fmt: skip
-    wider = Wider(replace(problem, form=form), fit, size)
+    new = form.searched % len(exponents) >= size
+    wider = Wider(replace(problem, form=form), fit, form.searched[new])
     if form.functions:
-        old = np.setdiff1d(form.searched, wider.further)
-        model = wider.model.of(np.append(old, wider.further))
-        _, variance = newcomers(model.information, model.gradient, len(old))
+        model = wider.model.of(np.append(form.searched[~new], wider.further))
+        _, variance = newcomers(model.information, model.gradient, int((~new).sum()))
         candidates.T.flat[wider.further[~np.isfinite(variance)]] = False
-        wider = Wider(wider.problem, fit, size)
+        wider = replace(wider, further=wider.further[np.isfinite(variance)])
     return wider
 
 
@@ -570,8 +564,7 @@ def pinned(
         cost = float(np.log((high - low)[axis] ** 2 / (2 * np.pi * variance)) - place**2 / variance)
         moved = forth @ rate
         new = (np.abs(moved) > FAINT * np.abs(moved).max(initial=0.0)) & ~law.support
-        # Odds of 20 to 1: strong evidence by Kass and Raftery 1995.
-        if new.any() and cost < 6.0:
+        if new.any() and cost < STRONG:
             yield "another origin", problem.form.names[axis], cost
 
 
@@ -638,10 +631,9 @@ def _met(problem: Problem, fit: Fit) -> list[Bools]:
     """Through which samples of each trajectory the curve of a law passes, as far as noise tells."""
     grid = fit.collocation.grid
     apart = np.abs(fit.collocation.curve(fit.state.control_points) - grid.x)
-    near = ~(apart > GROSS * residual_noise(fit)).any(axis=1)
+    near = np.asarray(~(apart > GROSS * residual_noise(fit)).any(axis=1))
     found = [np.zeros(len(t), dtype=bool) for t, _ in problem.trajectories]
-    ends = np.cumsum([len(segment.t) for segment in grid.segments])[:-1]
-    for segment, rows in zip(grid.segments, np.split(near, ends), strict=True):
+    for segment, rows in zip(grid.segments, grid.split(near), strict=True):
         times = problem.trajectories[segment.trajectory][0]
         found[segment.trajectory][np.searchsorted(times, segment.t)] = rows
     return found
@@ -738,7 +730,7 @@ def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:
 
 
 def _unmet(problem: Problem, fit: Fit, law: PolynomialSystem, remedy: str) -> Iterator[str]:
-    """Is the fit no minimum, does the curve not obey the law, or have its two frames two laws?
+    """Is the fit no minimum, or have the law's two frames two laws?
 
     The last may be apart by a fifth of the speed: terms that cannot be told from zero make less.
     """
@@ -750,12 +742,6 @@ def _unmet(problem: Problem, fit: Fit, law: PolynomialSystem, remedy: str) -> It
         yield (
             f"the last fit did not converge ({fit.status.value}): {meaning}; use {remedy}, or a "
             "lower degree"
-        )
-    residual = float(np.sqrt((fit.collocation.physics_residual(fit.state) ** 2).mean()))
-    if not residual < max(1e-2, 2 * float(problem.process_noise.max())):
-        yield (
-            f"the law is not met along the curve (residual {residual:.2g} of the speed): the fit "
-            f"did not converge; use {remedy}, or another degree"
         )
     units, (x, _) = problem.units, fit.collocation.node_states(fit.state.control_points)
     native = problem.law(fit.state)(x - fit.state.offset)
@@ -861,11 +847,11 @@ def _changing(problem: Problem, fit: Fit, tolerated: float, most: int = 8) -> It
         )
 
 
-def _far_neighbours(wider: Wider, remedy: str, odds_allowed: float = 0.05) -> Iterator[str]:
+def _far_neighbours(wider: Wider, remedy: str) -> Iterator[str]:
     """Has another law that may as well be true coefficients far from those of this one?
 
-    Unless the odds against it are 20 to 1 (strong evidence, as in `pinned`). The axes stay as they
-    are: the same law in another frame would count.
+    Unless the evidence against it is strong. The axes stay as they are: the same law in another
+    frame would count.
     """
     law, columns = wider.problem.law(wider.fit.state), wider.problem.form.searched
     support, present = wider.fit.state.free()[columns], wider.fit.state.flat()[columns]
@@ -876,7 +862,7 @@ def _far_neighbours(wider: Wider, remedy: str, odds_allowed: float = 0.05) -> It
     odds, dropped, added, entry, value = far_neighbours(
         model.information, model.gradient, present, penalties, support
     )
-    if odds > odds_allowed:
+    if odds > np.exp(-STRONG / 2):
         out, into = (place(law, columns[k]) if k >= 0 else "" for k in (dropped, added))
         change = f"{into} instead of {out}" if out and into else f"with {into}" if into else ""
         change = change or f"without {out}"

@@ -6,6 +6,7 @@ Its standard errors, too, and the intervals of absent terms.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -90,31 +91,21 @@ def infer(
         Passed on.
     """
     units, state, collocation = problem.units, fit.state, fit.collocation
-    form, exponents, (l, d) = problem.form, problem.exponents, state.coefficients.shape
-    covariance = _covariance(units, fit, model)
+    form, exponents = problem.form, problem.exponents
     coefficients = state.coefficients * units.factors(exponents)
     offset = np.where(state.moving, units.point(state.offset), 0.0)
     # What the frame of the data needs is decided at the errors at which the terms were chosen.
     tolerated = np.maximum([plateau.low / path.own for plateau in path.of(state.active)], 1.0)
     # To what the shift adds nothing, that the fit has weighed.
     weighed = _shifted(exponents, coefficients, offset)[0] == coefficients.T.ravel()
-    penalties = np.where(weighed, KEPT, problem.entry_penalties * np.repeat(tolerated, l) ** 2)
-    native = exponents, coefficients, offset, covariance
-    moved, moved_covariance = _pruned(*native, penalties)
-    law = form.law(moved + form.known)
-    seen = collocation.counts > 0
-    found = Discovery(
-        system=law,
+    tolerable = np.outer(tolerated**2, problem.penalties).ravel()
+    penalties = np.where(weighed, KEPT, tolerable)
+    noise = problem.noise if problem.has_process_noise else residual_noise(fit)
+    return Discovery(
+        **_in_both_frames(problem, fit, model, offset, penalties),
         native=form.law(coefficients + form.known),
         offset=offset,
-        covariance=moved_covariance,
-        native_covariance=covariance[: l * d, : l * d],
-        offset_errors=np.sqrt(np.diag(covariance)[l * d :]),
-        noise=np.where(
-            seen,
-            (problem.noise if problem.has_process_noise else residual_noise(fit)) * units.scale,
-            np.nan,
-        ),
+        noise=np.where(collocation.counts > 0, noise * units.scale, np.nan),
         model_error=_kicks(problem, fit),
         warnings=(),
         path=path.plateaus,
@@ -125,24 +116,30 @@ def infer(
             for s in collocation.grid.splines(state.control_points)
         ),
     )
-    return found
 
 
 def with_errors(found: Discovery, problem: Problem, fit: Fit, model: Linearisation) -> Discovery:
     """The same law, its error bars those of another quadratic model around its fit."""
-    state, form = fit.state, problem.form
-    covariance, size = _covariance(problem.units, fit, model), state.coefficients.size
-    coefficients = state.coefficients * problem.units.factors(problem.exponents)
-    kept = (found.system.support & ~(form.known != 0)).T.ravel()
-    native = problem.exponents, coefficients, found.offset, covariance
-    moved, moved_covariance = _pruned(*native, np.where(kept, KEPT, np.inf))
-    return replace(
-        found,
-        system=form.law(moved + form.known),
-        covariance=moved_covariance,
-        native_covariance=covariance[:size, :size],
-        offset_errors=np.sqrt(np.diag(covariance)[size:]),
+    kept = found.system.support & ~(problem.form.known != 0)
+    penalties = np.where(kept.T.ravel(), KEPT, np.inf)
+    return replace(found, **_in_both_frames(problem, fit, model, found.offset, penalties))
+
+
+def _in_both_frames(
+    problem: Problem, fit: Fit, model: Linearisation, offset: Floats, penalties: Floats
+) -> dict[str, Any]:
+    """The law in the frame of the data, and the errors in both, as a `Discovery` has them."""
+    covariance, size = _covariance(problem.units, fit, model), fit.state.coefficients.size
+    coefficients = fit.state.coefficients * problem.units.factors(problem.exponents)
+    moved, moved_covariance = _pruned(
+        problem.exponents, coefficients, offset, covariance, penalties
     )
+    return {
+        "system": problem.form.law(moved + problem.form.known),
+        "covariance": moved_covariance,
+        "native_covariance": covariance[:size, :size],
+        "offset_errors": np.sqrt(np.diag(covariance)[size:]),
+    }
 
 
 def _kicks(problem: Problem, fit: Fit) -> Floats:

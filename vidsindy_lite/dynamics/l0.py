@@ -23,6 +23,8 @@ COLLINEAR = 1e-9
 """Share of a column that is not a combination of others, below which it is taken to be one."""
 NEGLIGIBLE = 1e-6
 """Changes of the function below this are taken for rounding."""
+STRONG = 6.0
+"""Twice the log of odds of 20 to 1: strong evidence for one of two laws (Kass, Raftery 1995)."""
 FAR = 4.0
 """Standard errors of a coefficient beyond which another law has another coefficient."""
 LEAST = 1e-300
@@ -67,9 +69,7 @@ def subset_search(
     """
     model = _Quadratic.of(information, gradient, present, penalty)
     best = _search(model, start)
-    solution = np.zeros(len(penalty))
-    solution[best.inside] = best.fitted * model.scale[best.inside]
-    return best.support, solution, model.value(best)
+    return best.support, model.solution(best), model.value(best)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of columns that are all but combinations
@@ -131,9 +131,7 @@ def closest_rival(
 def minimiser(information: Floats, gradient: Floats, present: Floats, support: Bools) -> Floats:
     """Minimiser of the function of `subset_search` on a support, zero elsewhere, shape (m,)."""
     model = _Quadratic.of(information, gradient, present, np.zeros(len(present)))
-    fit, solution = model.fit(support), np.zeros(len(present))
-    solution[fit.inside] = fit.fitted * model.scale[fit.inside]
-    return solution
+    return model.solution(model.fit(support))
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,6 +223,12 @@ class _Quadratic:
         if (key := support.tobytes()) not in self.fits:
             self.fits[key] = self._fitted(support)
         return self.fits[key]
+
+    def solution(self, fit: _Fit) -> Floats:
+        """The minimiser, zero outside of the support, in units of its own entries."""
+        solution = np.zeros(len(self.scale))
+        solution[fit.inside] = fit.fitted * self.scale[fit.inside]
+        return solution
 
     def _fitted(self, support: Bools) -> _Fit:
         inside = np.flatnonzero(support)

@@ -24,6 +24,7 @@ from ..checks import (
     check_choice,
     check_instance,
     check_integer,
+    check_items,
     check_number,
     check_times,
     shown,
@@ -192,16 +193,6 @@ def monomials(x: Floats, exponents: Ints) -> Floats:
     return values.T
 
 
-def monomial_gradients(x: Floats, exponents: Ints) -> Floats:
-    """Derivatives of monomials, shape (n, l, d); see `monomials`."""
-    gradients = []
-    for i in range(x.shape[1]):
-        lowered = exponents.copy()
-        lowered[:, i] = np.maximum(lowered[:, i] - 1, 0)
-        gradients.append(exponents[:, i] * monomials(x, lowered))
-    return np.stack(gradients, axis=-1)
-
-
 def shift_matrix(exponents: Ints, offset: Floats, rows: Ints | slice = slice(None)) -> Floats:
     """Matrix ``S`` with ``phi(x - offset) = phi(x) S``, shape (l, l), or some rows of it.
 
@@ -227,6 +218,12 @@ def closure(exponents: Ints) -> Ints:
     divisors = {divisor for powers in exponents for divisor in np.ndindex(*(powers + 1))}
     ordered = sorted(divisors, key=lambda e: (sum(e), tuple(-p for p in e)))
     return np.array(ordered, dtype=int).reshape(-1, exponents.shape[1])
+
+
+def places_of(wanted: Ints, exponents: Ints) -> Ints:
+    """In which row of exponents each of the wanted monomials stands, which all are there."""
+    row = {tuple(powers): k for k, powers in enumerate(exponents.tolist())}
+    return np.array([row[tuple(powers)] for powers in wanted.tolist()], dtype=int)
 
 
 def divides(exponents: Ints, axes: Bools | None = None) -> Bools:
@@ -289,10 +286,7 @@ class Input:
         several = isinstance(t, list | tuple) and any(np.ndim(part) for part in t)
         times = cast("Sequence[Floats]", t if several else [t])
         runs = cast("Sequence[Floats]", values if several else [values])
-        if len(runs) != len(times):
-            raise ValueError(
-                f"inputs: {name} must be one per trajectory ({len(times)}), got {len(runs)}"
-            )
+        check_items(f"inputs: {name}", runs, len(times), "trajectory")
         found = [_curve(name, part, run, hold) for part, run in zip(times, runs, strict=True)]
         pieces = [curve for curve, _ in found]
         ends = sorted((spline.x[0], spline.x[-1]) for spline in pieces)
@@ -452,10 +446,7 @@ class Library:
         ValueError
             If it is no such mapping.
         """
-        if not isinstance(functions, Mapping) or not functions:
-            raise ValueError(
-                f"functions: must map names to functions of the variables, got {shown(functions)}"
-            )
+        check_mapping("functions", functions, "map names to functions of the variables")
         for name, rule in functions.items():
             if not isinstance(name, str) or not name.strip() or not callable(rule):
                 raise ValueError(
@@ -502,8 +493,7 @@ class Library:
         >>> library = vl.Library.polynomial(3) + vl.Library.inputs(t, {"u": u})
         >>> vl.discover(t, x, library=library, order=2)  # x'' = -x - x^3 - 0.2 vx + 0.5 u
         """
-        if not isinstance(values, Mapping) or not values:
-            raise ValueError(f"inputs: must map names to values at t, got {shown(values)}")
+        check_mapping("inputs", values, "map names to values at t")
         if hold is not None:
             check_choice("hold", hold, ("zero", "linear", "cubic"))
         return cls.terms({name: Input.of(name, t, given, hold) for name, given in values.items()})
@@ -534,13 +524,10 @@ class Library:
         >>> vl.Library.polynomial(2).where(known | forbidden)
         """
         rows = {name: dict(terms) for name, terms in self.given}
-        given = equations.items() if isinstance(equations, Mapping) else ()
-        if not given or not all(isinstance(terms, Mapping) for _, terms in given):
-            raise ValueError(
-                "equations: must give variables what is known of their terms, e.g. "
-                f"{{'x': {{'y': 10, 'z': 0}}}}, got {shown(equations)}"
-            )
-        for name, terms in given:
+        example = "{'x': {'y': 10, 'z': 0}}"
+        rule = f"give variables what is known of their terms, e.g. {example}"
+        check_mapping("equations", equations, rule, Mapping)
+        for name, terms in equations.items():
             checked = {
                 term: None if value is None else check_number(f"coefficient of {term}", value)
                 for term, value in terms.items()
@@ -698,6 +685,13 @@ def check_library(degree: int | None, library: Library | None) -> Library:
     if library == Library():
         raise ValueError("library: must hold a term, got none")
     return library
+
+
+def check_mapping(name: str, value: object, rule: str, of: type = object) -> None:
+    """A mapping that is not empty, of values of a type."""
+    rows = value.values() if isinstance(value, Mapping) else ()
+    if not rows or not all(isinstance(row, of) for row in rows):
+        raise ValueError(f"{name}: must {rule}, got {shown(value)}")
 
 
 def harmonic(names: tuple[str, ...], axis: int, multiple: int, kind: str) -> Function:

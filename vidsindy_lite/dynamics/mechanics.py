@@ -658,9 +658,7 @@ def _axes(away: Floats, zero: ArrayLike | None, span: Floats) -> Floats:
 
     The sign of each but the first is such that its largest component is positive.
     """
-    first = away.mean(axis=0) if zero is None else check_array("zero", zero)
-    if first.shape != away.shape[1:] or not np.isfinite(first).all():
-        raise ValueError(f"zero: must be {away.shape[1]} finite numbers, got {shown(zero)}")
+    first = away.mean(axis=0) if zero is None else check_vector("zero", zero, away.shape[1])
     within = span.T @ (span @ first)
     length = np.linalg.norm(within)
     if not length > 1e-6 * np.linalg.norm(first):

@@ -32,12 +32,14 @@ from .library import (
     Function,
     Library,
     along_state,
+    check_mapping,
     closure,
     extended,
     law_variables,
-    monomial_gradients,
     monomials,
     name_latex,
+    places_of,
+    shift_generators,
     shift_matrix,
     velocity_names,
 )
@@ -316,12 +318,9 @@ class PolynomialSystem:
             If the equations are no such mapping, or a term names an unknown variable or has a
             higher degree than the library.
         """
-        given = equations.values() if isinstance(equations, Mapping) else ()
-        if not given or not all(isinstance(terms, Mapping) for terms in given):
-            raise ValueError(
-                "equations: must give each variable its terms, e.g. {'x': {'x': -10, 'y': 10}, "
-                f"'y': {{'x': 1}}}}, got {shown(equations)}"
-            )
+        example = "{'x': {'x': -10, 'y': 10}, 'y': {'x': 1}}"
+        rule = f"give each variable its terms, e.g. {example}"
+        check_mapping("equations", equations, rule, Mapping)
         names, held = tuple(equations), Library() if library is None else library
         check_instance("library", held, Library)
         states = names[:-1] if CLOCK in names[-1:] and held.timed(names[:-1]) else names
@@ -332,7 +331,7 @@ class PolynomialSystem:
         known += tuple(f"{name}'" for name in names if held.denominators)
         parsed = [
             (parse_term(term, known), column, check_number(f"coefficient of {term}", value))
-            for column, terms in enumerate(given)
+            for column, terms in enumerate(equations.values())
             for term, value in terms.items()
         ]
         highest = max((sum(powers) for powers, _, _ in parsed), default=0)
@@ -340,11 +339,12 @@ class PolynomialSystem:
         if highest > degree:
             raise ValueError(f"degree: must be at least that of the terms, {highest}, got {degree}")
         wanted, _ = (held + Library.polynomial(degree)).resolve(names, measured)
-        exponents = closure(np.array([*wanted.tolist(), *(powers for powers, _, _ in parsed)]))
-        index = {tuple(e): row for row, e in enumerate(exponents.tolist())}
+        named = np.array([powers for powers, _, _ in parsed]).reshape(-1, wanted.shape[1])
+        exponents = closure(np.concatenate([wanted, named]))
         coefficients = np.zeros((len(exponents), len(names)))
-        for powers, column, value in parsed:
-            coefficients[index[powers], column] += value
+        rows = places_of(named, exponents).tolist()
+        for row, (_, column, value) in zip(rows, parsed, strict=True):
+            coefficients[row, column] += value
         return cls(names, exponents, coefficients, functions=functions)
 
     @property
@@ -420,6 +420,14 @@ class PolynomialSystem:
         used = self.support.any(axis=1) | self.is_polynomial
         return replace(self, exponents=self.exponents[used], coefficients=self.coefficients[used])
 
+    @cached_property
+    def _closed(self) -> tuple[Ints, Floats]:
+        """Exponents and coefficients in a library that is closed under a shift of the origin."""
+        exponents = closure(self.exponents)
+        coefficients = np.zeros((len(exponents), self.d))
+        coefficients[places_of(self.exponents, exponents)] = self.coefficients
+        return exponents, coefficients
+
     def library(self, x: Floats) -> Floats:
         """Candidate terms ``phi(x)``: (n, d) points to (n, l) values; slopes are the law's."""
         z, _ = law_variables(self._points(x), self.functions, self.exponents, self.coefficients)
@@ -443,10 +451,10 @@ class PolynomialSystem:
         ndarray, shape (n, d, d) or (d, d)
             ``[..., j, i]`` is the derivative of equation j with respect to variable i.
         """
-        x, own = check_array("x", x), self._own
-        points = self._points(np.atleast_2d(x))
-        z, below = law_variables(points, own.functions, own.exponents, own.coefficients)
-        rates = np.einsum("nli,lj->nji", monomial_gradients(z, own.exponents), own.coefficients)
+        x = check_array("x", x)
+        points, (exponents, law) = self._points(np.atleast_2d(x)), self._own._closed
+        z, below = law_variables(points, self.functions, exponents, law)
+        rates = (monomials(z, exponents) @ (shift_generators(exponents) @ law)).transpose(1, 2, 0)
         jacobian = along_state(rates, points, self.functions) / below[:, :, None]
         return jacobian.reshape(*x.shape, self.d)
 
@@ -472,10 +480,7 @@ class PolynomialSystem:
             raise ValueError(
                 f"offset: must be zero for a law with functions of the state, got {shown(offset)}"
             )
-        exponents = closure(self.exponents)
-        rows = {tuple(e): row for row, e in enumerate(exponents)}
-        closed = np.zeros((len(exponents), self.d))
-        closed[[rows[tuple(e)] for e in self.exponents]] = self.coefficients
+        exponents, closed = self._closed
         matrix = shift_matrix(exponents, shift)
         shifted = matrix @ closed
         # What cancels in exact arithmetic must not survive as a term of 1e-16.
@@ -713,20 +718,19 @@ class Form:
         wanted, functions = library.resolve(names, measured)
         velocities = np.eye(wanted.shape[1], dtype=int)[measured:states]
         exponents = closure(np.concatenate([wanted, velocities]))
-        row = {tuple(powers): k for k, powers in enumerate(exponents.tolist())}
         known = np.zeros((len(exponents), d))
-        for position, velocity in enumerate(velocities.tolist()):
-            known[row[tuple(velocity)], position] = 1.0
+        known[places_of(velocities, exponents), np.arange(len(velocities))] = 1.0
         known[0, states:] = 1.0
         candidates, sought = np.zeros(known.shape, dtype=bool), slice(states - measured, states)
-        candidates[[row[tuple(powers)] for powers in wanted.tolist()], sought] = True
+        candidates[places_of(wanted, exponents), sought] = True
         shared, first = np.arange(candidates.size).reshape(d, -1), None
-        alone = np.eye(wanted.shape[1], dtype=int)[d:].tolist()
-        for powers, function in zip(alone, functions, strict=False):
+        alone = np.eye(wanted.shape[1], dtype=int)[d : d + len(functions)]
+        rows = places_of(alone, exponents).tolist()
+        for here, function in zip(rows, functions, strict=True):
             direction = function.direction
             if direction is None:
                 continue
-            equation, here = states - measured + direction, row[tuple(powers)]
+            equation = states - measured + direction
             candidates[here, np.arange(d) != equation] = False
             first = None if direction == 0 else first
             if _vanishes(function, d):

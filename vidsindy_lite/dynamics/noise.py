@@ -70,11 +70,11 @@ def _errors_seen(fit: Fit) -> list[list[Floats]]:
     collocation = fit.collocation
     residual, _ = collocation.data_residual(fit.state.control_points)
     residual *= np.sqrt(collocation.precision)
-    seen = np.isfinite(collocation.grid.x)
-    ends = np.cumsum([len(segment.t) for segment in collocation.segments])[:-1]
-    stretches = list(zip(np.split(residual, ends), np.split(seen, ends), strict=True))
+    residual[np.isnan(collocation.grid.x)] = np.nan
+    stretches = collocation.grid.split(residual)
     return [
-        [errors[here[:, j], j, None] for errors, here in stretches] for j in range(collocation.d)
+        [errors[~np.isnan(errors[:, j]), j, None] for errors in stretches]
+        for j in range(collocation.d)
     ]
 
 
@@ -207,13 +207,7 @@ def _factors(residual: Floats, causes: list[Floats]) -> Floats:
     if not cost < plain - LIKELY or gross.mean() > 0.1:  # if so many are wrong, the law is
         return even
     precision = np.minimum(np.median(variance) / variance, LARGEST_RATIO)
-    return np.where(gross & _alone(residual), 0.0, precision)
-
-
-def _alone(residual: Floats) -> Bools:
-    """Which residuals are more than twice those around them, (n,)."""
-    around = np.stack([np.roll(residual, k) for k in (-2, -1, 1, 2)])
-    return np.abs(residual) > 2 * np.abs(np.median(around, axis=0))
+    return np.where(gross, 0.0, precision)
 
 
 def _variance(residual: Floats, causes: Floats, updates: int = 60) -> tuple[float, Floats, Bools]:

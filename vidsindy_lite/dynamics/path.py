@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
@@ -29,7 +30,7 @@ from ..arrays import Bools, Floats
 from .bspline import Segment
 from .collocation import Fit, State, Status
 from .frames import Origin, cheapest, closed, free_offsets, with_fewer_axes
-from .l0 import NEGLIGIBLE, inverse, minimiser, subset_path, subset_search
+from .l0 import NEGLIGIBLE, STRONG, inverse, minimiser, subset_path, subset_search
 from .model import PolynomialSystem, runge_kutta_4
 from .noise import (
     CONSISTENT,
@@ -74,9 +75,8 @@ def follow(problem: Problem, fit: Fit) -> Path:
     fit : Fit
         Around which.
     """
-    model, terms_end = problem.model(fit), len(problem.form.searched)
+    model = problem.model(fit)
     columns = model.columns
-    penalties = np.append(problem.entry_penalties, np.full(problem.d, -np.inf))[columns]
     present, support = fit.state.flat()[columns], fit.state.free()[columns]
     own = typical(np.maximum(fit.collocation.data_weights**-0.5, problem.process_noise))
     single = np.full(problem.d, own) if problem.has_process_noise else residual_noise(fit)
@@ -88,25 +88,24 @@ def follow(problem: Problem, fit: Fit) -> Path:
     count = int(np.ceil(np.log10(LARGEST / lowest) / STEP))
     # What has to be tolerated is asked itself: a plateau may begin just below it.
     levels = np.union1d(np.geomspace(lowest, LARGEST, count + 1), min(level, LARGEST))
-    paths: list[list[Plateau]] = [[] for _ in range(problem.d)]
-    lows, highs = levels[:-1].tolist(), levels[1:].tolist()
-    shares = [(own / low) ** 2 for low in lows]
+    shares = [(own / low) ** 2 for low in levels[:-1].tolist()]
     tolerating = [model.tolerating(share) for share in shares]
     functions = [
         (m.information, m.gradient, share) for m, share in zip(tolerating, shares, strict=True)
     ]
-    searched = subset_path(functions, present, penalties, support)
-    for low, high, support in zip(lows, highs, searched, strict=True):
-        active = np.zeros(problem.form.candidates.T.shape, dtype=bool)
-        active.flat[problem.form.searched] = support[:terms_end]
-        active = fit.state.whole(active.T).T
-        for j, terms in enumerate(active):
-            if paths[j] and (paths[j][-1].terms == terms).all():
-                low_here = paths[j].pop().low
-            else:
-                low_here = low
-            paths[j].append(Plateau(j, low_here, high, terms))
-    return Path(fit, model, own, level, tuple(map(tuple, paths)))
+    searched = subset_path(functions, present, problem.costs(columns), support)
+    flat = np.zeros((len(searched), problem.form.candidates.size), dtype=bool)
+    flat[:, problem.form.searched] = np.array(searched)[:, : len(problem.form.searched)]
+    laws = flat[:, problem.form.shared].reshape(len(flat), problem.d, -1)
+    plateaus = (_plateaus(j, levels.tolist(), laws[:, j]) for j in range(problem.d))
+    return Path(fit, model, own, level, tuple(plateaus))
+
+
+def _plateaus(equation: int, levels: list[float], laws: Bools) -> tuple[Plateau, ...]:
+    """The ranges between levels in which laws of an equation, (n, l), one after the other agree."""
+    changes = np.flatnonzero((laws[1:] != laws[:-1]).any(axis=1)) + 1
+    ends = pairwise([0, *changes.tolist(), len(laws)])
+    return tuple(Plateau(equation, levels[low], levels[high], laws[low]) for low, high in ends)
 
 
 def typical(noise: Floats) -> float:
@@ -157,13 +156,12 @@ def select(problem: Problem, start: Fit, weight: float, stage: str, history: His
 
     best = refit(start.state)
     history.add(stage, problem, best, weight)
-    penalties = np.append(problem.entry_penalties, np.full(problem.d, -np.inf))
     for _ in range(LONGEST_SEARCH):
         state = best.state
         columns = problem.columns(state)
         model = weighted.linearise(state, columns)
         support, solution, _ = subset_search(
-            model.information, model.gradient, state.flat()[columns], penalties[columns],
+            model.information, model.gradient, state.flat()[columns], problem.costs(columns),
             state.free()[columns],
         )  # fmt: skip
         if (support == state.free()[columns]).all():
@@ -262,7 +260,7 @@ def persistent(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path,
     return fit, path, fit.status is Status.CONVERGED and has_terms(fit, path.widest())
 
 
-def near(problem: Problem, fit: Fit, tolerated: float) -> bool:
+def near(problem: Problem, fit: Fit, tolerated: float = 0.0) -> bool:
     """Whether a law leaves hardly more than the noise, or than is tolerated."""
     limit = CONSISTENT * np.maximum(problem.noise, tolerated)
     return bool((errors_left(problem, fit) <= limit).all())
@@ -284,7 +282,7 @@ def deepest(
     """
     for _ in range(most):
         errors = errors_left(problem, path.fit)
-        if near(problem, path.fit, 0.0) or history.over:
+        if near(problem, path.fit) or history.over:
             break
         tolerant = replace(problem, noise=np.maximum(problem.noise, errors / descent))
         collocation = path.fit.collocation
@@ -302,13 +300,12 @@ def _explains(problem: Problem, before: Fit, after: Fit) -> bool:
     """Whether what a law takes of the errors of single samples is worth its terms.
 
     Of errors that last, with that law, any term takes some: only so many samples count as have
-    independent errors, and the evidence has to be strong (2 log of the odds above 6: Kass, Raftery
-    1995).
+    independent errors, and the evidence has to be strong.
     """
     one, two = residual_noise(before), residual_noise(after)
     independent = after.collocation.counts * (two / effective_noise(after)) ** 2
     gain = independent @ np.log((one / two) ** 2)
-    return bool(gain > problem.penalty(after.state) - problem.penalty(before.state) + 6)
+    return bool(gain > problem.penalty(after.state) - problem.penalty(before.state) + STRONG)
 
 
 def at_own_errors(problem: Problem, fit: Fit) -> Fit:

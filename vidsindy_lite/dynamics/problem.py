@@ -12,12 +12,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import BSpline
-from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.interpolate import BSpline, make_lsq_spline
 from scipy.special import chdtri
 
 from ..arrays import Bools, Floats, Ints
-from .bspline import DEGREE, PENALTIES, WIDTH, Segment, basis, normal_band, smooth
+from .bspline import DEGREE, PENALTIES, Segment, smooth
 from .collocation import CLEANEST, Collocation, Fit, State, Status, WithCurve
 from .data import Trajectory, Units, cut, typical_step, typical_steps
 from .l0 import LEAST
@@ -138,6 +137,10 @@ class Problem:
         """The same at the penalties of `SURE`, at which a law is compared with its rivals."""
         equations = self.measured[0][1].shape[1]
         return replace(self, penalties=term_penalties(self.exponents, equations, SURE))
+
+    def costs(self, columns: Ints) -> Floats:
+        """Penalties of entries of `State.flat` in a search in which no axis is dropped."""
+        return np.append(self.entry_penalties, np.full(self.d, -np.inf))[columns]
 
     def columns(self, state: State) -> Ints:
         """Entries of `State.flat` that may differ from zero: candidates and moving axes."""
@@ -270,9 +273,8 @@ def fit_curves(collocation: Collocation, curves: Sequence[Callable[[Floats], Flo
     for segment, curve in zip(collocation.segments, curves, strict=True):
         b = segment.breakpoints
         dense = np.append((b[:-1, None] + np.diff(b)[:, None] * np.arange(4) / 4).ravel(), b[-1])
-        rows = basis([segment.knots], np.array([0, len(segment.knots) - WIDTH]), [dense])
-        factor = cholesky_banded(normal_band(rows), lower=True)
-        control.append(cho_solve_banded((factor, True), rows.T @ curve(dense)))
+        spline = make_lsq_spline(dense, curve(dense), segment.knots, DEGREE, method="norm-eq")
+        control.append(spline.c)
     return np.concatenate(control)
 
 

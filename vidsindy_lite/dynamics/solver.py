@@ -30,7 +30,7 @@ from .diagnostics import diagnose, is_on_circle
 from .inference import infer, with_errors
 from .library import Library, check_library, monomial_exponents, monomials
 from .model import Form
-from .noise import TOLERATED, rebalanced, smoother_weights, views, with_process_noise
+from .noise import rebalanced, smoother_weights, views, with_process_noise
 from .orientation import Measured, Solved, check_orientation, in_axes, in_sparsest_axes, with_turns
 from .path import ROUNDS, first_law, information_criterion, near, persistent
 from .problem import Problem, pose
@@ -248,8 +248,8 @@ def _solved(task: _Task, form: Form) -> Solved:
     trajectories, shared, sigma = task.measured
     probes = np.random.default_rng(task.seed)
     problems = views(lambda *how: pose(trajectories, shared, form, probes, sigma, *how))
-    # A first law, one under process noise, and one at larger errors.
-    rounds = 3 * (1 + ROUNDS) * len(problems)
+    # A first law, and one under process noise or at larger errors.
+    rounds = 2 * (1 + ROUNDS) * len(problems)
     with bar(task.progress, "discover", total=rounds, leave=False) as shown_bar:
         history = History(end=task.end, bar=shown_bar)
         laws = [_law(problem, probes, history) for problem in problems]
@@ -266,19 +266,15 @@ def _law(
 ) -> tuple[Problem, Fit, Path]:
     """The law that persists: the problem as that tells it, the last fit, and the path of laws.
 
-    Where a first law does not fit, there may be process noise; where no path leads to a law, errors
-    that last may have made terms of the first, and one that tolerates them is the start.
+    Where it leaves more than the noise, there may be process noise; where no path leads to a law,
+    errors that last may have made terms of the first, and one that tolerates them is the start.
     """
-    fit = first_law(problem, history)
-    asked = not near(problem, fit, TOLERATED)
-    if asked and not history.over:
-        problem, fit = _under_process_noise(problem, fit, probes, history) or (problem, fit)
-    fit, path, persists = persistent(problem, fit, history)
-    if not (asked or history.over or near(problem, fit, 0.0)):
+    fit, path, persists = persistent(problem, first_law(problem, history), history)
+    if not (near(problem, fit) or history.over):
         found = _under_process_noise(problem, fit, probes, history)
         if found is not None:
             return found[0], *persistent(*found, history)[:2]
-    if not (persists or problem.has_process_noise or history.over):
+    if not (persists or history.over):
         law = first_law(problem, history, path.level)
         other, around, leads = persistent(problem, law, history)
         fit, path = (other, around) if leads else (fit, path)

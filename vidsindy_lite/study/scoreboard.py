@@ -516,7 +516,7 @@ def _own(problem: Any, fit: Any, *_: Any) -> Any:
 WITHOUT: dict[str, tuple[tuple[Any, str, Any], ...]] = {
     NOTHING: (),
     "support path": ((solver, "persistent", _first_law_alone),),
-    "first tolerance": tuple((where, "TOLERATED", 0.0) for where in (path, solver, noise)),
+    "first tolerance": tuple((where, "TOLERATED", 0.0) for where in (path, noise)),
     "floor for smooth errors": ((path, "SMOOTH", 0.0),),
     "integrated autocorrelation time": ((noise, "effective_noise", noise.residual_noise),
                                         (path, "effective_noise", noise.residual_noise)),
