@@ -258,21 +258,22 @@ def _observed(
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
     films = Footage.of(raw, lags, clock.rates, clock.frames)
+    affine = None
     if not rig.is_measured:
         with refusing("cameras", raw, names):
             far = cameras.factorised(films, rig, lags is not None)
-            if far is None or far.moving > 1:  # a line tells of no lens
-                alike = np.inf if far is None else cameras.ALIKE * far.lags.residual
-                most = min(cameras.GROSS, alike)
-                try:
-                    rig, far = cameras.posed(films.aligned, rig, lags is not None, most), None
-                except ValueError:
-                    if far is None:
-                        raise
             if far is not None:
                 tracks = replace(films, lags=far.lags.frames).aligned
                 warnings = (*far.lags.warnings, *doubts)
-                return _concluded(raw, tracks, far.rig, far.lags, clock, [], warnings, far.moving)
+                affine = _concluded(raw, tracks, far.rig, far.lags, clock, [], warnings, far.moving)
+                if far.moving == 1:  # a line tells of no lens
+                    return affine
+            try:
+                rig = cameras.posed(films.aligned, rig, lags is not None)
+            except ValueError:
+                if affine is None:
+                    raise
+                return affine
             doubts = (*rig.warnings, *doubts)
     first: list[str] = []
     start = lags
@@ -298,6 +299,10 @@ def _observed(
     with refusing("cameras", raw, names):
         learned = cameras.learn_cameras(tracks, rig)
     missed = cameras.disagreement(tracks, learned)
+    if affine is not None:  # pinholes that leave more than parallel projections are none
+        left = max(cameras.disagreement(affine.tracks, affine.rig), default=0.0)
+        if max(missed) > max(cameras.BETTER * left, cameras.DISAGREEMENT):
+            return affine
     told = best
     if lags is not None:
         told = replace(best, frames=lags, errors=0 * lags, residual=max(missed), warnings=())

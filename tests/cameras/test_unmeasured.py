@@ -149,11 +149,11 @@ def swinging(frames, moving=3):
     return size * np.cos(2 * np.pi * t[:, None] / period + [0.3, 1.0, 2.0])
 
 
-def far_away(views=3, moving=3, noise=0.2, count=240, seed=0):
+def far_away(views=3, moving=3, noise=0.2, count=240, seed=0, lags=LAGS):
     """Tracks of cut-out films by cameras far away, each begun at its own time."""
     rng = np.random.default_rng(seed)
     tracks = []
-    for lag in LAGS[:views]:
+    for lag in lags[:views]:
         axes, middle = rng.normal(size=(2, 3)), rng.uniform(50, 300, size=2)
         x = swinging(np.arange(count) + lag, moving)
         tracks.append(middle + x @ axes.T + noise * rng.normal(size=(count, 2)))
@@ -168,6 +168,15 @@ def test_lags_and_axes_of_motion(views, moving):
     np.testing.assert_allclose(found.lags.frames, LAGS[:views], atol=0.1)
     assert (found.lags.errors[1:] < 0.05).all()
     assert found.lags.residual < 0.3
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_noise_makes_no_pinholes_of_parallel_views_and_no_fractions_of_whole_lags(seed):
+    lags = np.array([0.0, 2.0, -3.0])
+    tracks, rig = far_away(noise=2.0, count=150, seed=seed, lags=lags)
+    seen = vl.observe_tracks(tracks, rig, np.arange(150) / FPS)
+    assert "affine" in seen.rig.note
+    np.testing.assert_allclose(seen.lags.frames, lags, atol=0.2)
 
 
 def test_views_of_different_things_do_not_agree():

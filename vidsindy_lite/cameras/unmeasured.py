@@ -38,7 +38,7 @@ from scipy.linalg import polar
 from scipy.optimize import least_squares
 
 from ..arrays import Floats
-from .adjust import PARTS, Adjustment, adjust, known_to
+from .adjust import PARTS, Adjustment, adjust, known_to, long_run_covariance
 from .clocks import OVERLAP, Footage, Lags, dips
 from .models import AffineCamera, PerspectiveCamera, at_once, missed
 from .rig import ALIKE, BETTER, FINE, GROSS, Rig, check_views
@@ -61,7 +61,7 @@ _NOTE = (
 )
 
 
-def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True, most: float = GROSS) -> Rig:
+def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True) -> Rig:
     """The rig with places and directions found from tracks, if it has none.
 
     Parameters
@@ -72,8 +72,6 @@ def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True, most: fl
         See `Rig.is_measured`.
     synchronous : bool
         ... or but for small lags, which are then learned as well, and forgotten.
-    most : float
-        Noise that may be left, pixels.
 
     Raises
     ------
@@ -97,7 +95,7 @@ def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True, most: fl
         if np.isfinite(fit.misses).any():
             fits.append(fit)
     best = min(fits, key=lambda fit: fit.noise, default=None)
-    if best is None or best.noise > most:
+    if best is None or best.noise > GROSS:
         left = "no start" if best is None else f"views that are {best.noise:.1f} pixels apart"
         raise ValueError(
             "rig: the tracks must tell where the cameras stand, as nothing of it is measured, got "
@@ -301,13 +299,14 @@ def factorised(films: Footage, rig: Rig, synchronous: bool = False) -> Factorise
     found = [_best(films.some, rank, synchronous) for rank in ranks]
     enough = max(BETTER * found[-1][0], FINE)
     rank = next(rank for rank, (left, *_) in zip(ranks, found, strict=True) if left <= enough)
-    left, best, errors = found[rank - 1]
-    if not np.isfinite(left):
+    least, best, errors = found[rank - 1]
+    if not np.isfinite(least):
         return None
     images = _images(films, best, range(count))
     moved, missed = (
         np.nanmean((_beyond(images, r) ** 2).reshape(-1, count, 2), axis=(0, 2)) for r in (0, rank)
     )
+    left = float(np.sqrt(missed.mean() / (1 - rank / (2 * count))))
     # Times what is left by which a target must move, rms, in every view.
     if not (moved > 5.0**2 * missed).all():
         return None
@@ -328,8 +327,8 @@ def _least(footage: Footage) -> float:
 
 
 def _left(footage: Footage, lags: Floats, places: Sequence[int], rank: int) -> float:
-    """Noise of the pixels that is left beyond a rank; infinite of too few common frames."""
-    beyond = _beyond(_images(footage, lags, places), rank)
+    """Noise that is left of `_averaged` pixels beyond a rank; infinite of too few common frames."""
+    beyond = _beyond(_averaged(_images(footage, lags, places)), rank)
     count, width = np.isfinite(beyond[:, 0]).sum(), beyond.shape[1]
     step = footage.span / max(len(footage.instants) - 1, 1)
     if count <= width or count * step < _least(footage):
@@ -375,18 +374,20 @@ def _promising(footage: Footage, i: int, rank: int) -> list[float]:
 def _polished(footage: Footage, lags: Floats, count: int, rank: int) -> tuple[Floats, Floats]:
     """The lags of so many views, to fractions of a frame, that leave least near by.
 
-    And their standard errors, if what is left is independent noise.
+    And their standard errors, of errors that may last for many frames, as those of `adjust`.
     """
 
     def beyond(others: Floats) -> Floats:
-        late = np.append(0.0, others)
-        return np.nan_to_num(_beyond(_images(footage, late, range(count)), rank)).ravel()
+        images = _images(footage, np.append(0.0, others), range(count))
+        return np.nan_to_num(_beyond(_averaged(images), rank)).ravel()
 
     found = least_squares(beyond, lags[1:count], diff_step=1e-3, max_nfev=_STEPS)
     information, errors = found.jac.T @ found.jac, np.full(count - 1, np.inf)
     if np.linalg.cond(information) <= 1 / np.finfo(float).eps:
-        variance = 2 * found.cost / max(np.count_nonzero(found.fun) / 2, 1)
-        errors = np.sqrt(variance * np.diag(np.linalg.inv(information)))
+        each = (found.jac * found.fun[:, None]).reshape(-1, 2 * count, count - 1).sum(axis=1)
+        inverse = np.linalg.inv(information)
+        together = len(each) * inverse @ long_run_covariance(each) @ inverse
+        errors = np.sqrt(np.diag(together))
     last = np.zeros(len(lags) - count)
     return np.concatenate(([0.0], found.x, last)), np.concatenate(([0.0], errors, last))
 
@@ -395,6 +396,16 @@ def _images(footage: Footage, lags: Floats, places: Sequence[int]) -> Floats:
     """Tracks of some views that begin so late, side by side, (n, 2 m)."""
     late = replace(footage, lags=lags)
     return np.hstack([late.curves[i].at(late.frames(i)) for i in places])
+
+
+def _averaged(images: Floats) -> Floats:
+    """Means around each instant, in which noise is as large between frames as in them.
+
+    A curve has less noise between two samples than in them: lags would lean to half frames.
+    """
+    for _ in range(2):
+        images = (images[:-2] + 2 * images[1:-1] + images[2:]) / 4
+    return images
 
 
 def _spread(images: Floats) -> tuple[Floats, Floats, Floats]:
