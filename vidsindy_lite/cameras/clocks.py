@@ -173,6 +173,18 @@ class Curve:
         values[~((frames == within) & self.shown[low] & self.shown[high] & near)] = np.nan
         return values
 
+    def averaged(self, step: float) -> Curve:
+        """Of means over five places, `step` frames apart: its noise is alike in and between frames.
+
+        NaN where it was, and where they are not all within the video.
+        """
+        if not self.shown.any():
+            return self
+        window = self.clock[:, None] + step * np.arange(-2, 3)
+        inside = (window >= self.clock[0]).all(axis=1) & (window <= self.clock[-1]).all(axis=1)
+        means = np.array([1, 4, 6, 4, 1]) / 16 @ self._spline(window)
+        return Curve(np.where((self.shown & inside)[:, None], means, np.nan), self.clock)
+
     def slope(self, frames: Floats) -> Floats:
         """Pixels a frame, (n, 2), from the frame before to the frame after; finite everywhere.
 

@@ -296,7 +296,10 @@ def factorised(films: Footage, rig: Rig, synchronous: bool = False) -> Factorise
         Whether the lags are those of the footage; they are found if not.
     """
     count, ranks = len(films.curves), range(1, 4)
-    found = [_best(films.some, rank, synchronous) for rank in ranks]
+    # Else lags would lean to half frames: a curve has less noise between two samples than in them.
+    curves = [curve.averaged(rate) for curve, rate in zip(films.curves, films.rates, strict=True)]
+    some = replace(films, curves=tuple(curves)).some
+    found = [_best(some, rank, synchronous) for rank in ranks]
     enough = max(BETTER * found[-1][0], FINE)
     rank = next(rank for rank, (left, *_) in zip(ranks, found, strict=True) if left <= enough)
     least, best, errors = found[rank - 1]
@@ -327,8 +330,8 @@ def _least(footage: Footage) -> float:
 
 
 def _left(footage: Footage, lags: Floats, places: Sequence[int], rank: int) -> float:
-    """Noise that is left of `_averaged` pixels beyond a rank; infinite of too few common frames."""
-    beyond = _beyond(_averaged(_images(footage, lags, places)), rank)
+    """Noise of the pixels that is left beyond a rank; infinite of too few common frames."""
+    beyond = _beyond(_images(footage, lags, places), rank)
     count, width = np.isfinite(beyond[:, 0]).sum(), beyond.shape[1]
     step = footage.span / max(len(footage.instants) - 1, 1)
     if count <= width or count * step < _least(footage):
@@ -378,8 +381,8 @@ def _polished(footage: Footage, lags: Floats, count: int, rank: int) -> tuple[Fl
     """
 
     def beyond(others: Floats) -> Floats:
-        images = _images(footage, np.append(0.0, others), range(count))
-        return np.nan_to_num(_beyond(_averaged(images), rank)).ravel()
+        late = np.append(0.0, others)
+        return np.nan_to_num(_beyond(_images(footage, late, range(count)), rank)).ravel()
 
     found = least_squares(beyond, lags[1:count], diff_step=1e-3, max_nfev=_STEPS)
     information, errors = found.jac.T @ found.jac, np.full(count - 1, np.inf)
@@ -396,16 +399,6 @@ def _images(footage: Footage, lags: Floats, places: Sequence[int]) -> Floats:
     """Tracks of some views that begin so late, side by side, (n, 2 m)."""
     late = replace(footage, lags=lags)
     return np.hstack([late.curves[i].at(late.frames(i)) for i in places])
-
-
-def _averaged(images: Floats) -> Floats:
-    """Means around each instant, in which noise is as large between frames as in them.
-
-    A curve has less noise between two samples than in them: lags would lean to half frames.
-    """
-    for _ in range(2):
-        images = (images[:-2] + 2 * images[1:-1] + images[2:]) / 4
-    return images
 
 
 def _spread(images: Floats) -> tuple[Floats, Floats, Floats]:
