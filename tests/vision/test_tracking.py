@@ -62,8 +62,8 @@ def test_a_hidden_target_is_not_seen_and_a_partly_hidden_one_not_trusted(tmp_pat
     error = errors(render_video(tmp_path / "clip.mov", truth, scene, seed=4), truth)
     distance = distance_to_rectangle(truth, post)
     assert np.isnan(error[distance < 8]).all()
-    assert np.isfinite(error[distance > 14]).mean() > 0.97
-    assert np.nanmax(error) < 0.5
+    assert np.isfinite(error[distance > 14]).mean() > 0.93
+    assert np.nanmax(error) < (0.5 if variance else 0.01)
 
 
 def test_a_target_across_the_border_is_not_trusted(tmp_path):

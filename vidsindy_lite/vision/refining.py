@@ -263,12 +263,9 @@ def displaced(
 
 
 def _trend(frames: Ints, at: Ints, values: Floats) -> Floats:
-    """What the nine nearest values say of each frame: the line of Theil and Sen through them."""
-    first = np.searchsorted(at, frames)[:, None] - np.arange(_AROUND)
-    first = np.clip(first, 0, len(at) - _AROUND)
-    reach = np.maximum(frames[:, None] - at[first], at[first + _AROUND - 1] - frames[:, None])
-    nearest = np.take_along_axis(first, reach.argmin(axis=1)[:, None], axis=1)
-    around = nearest + np.arange(_AROUND)
+    """What the values around each frame say of it: the line of Theil and Sen through nine."""
+    first = np.clip(np.searchsorted(at, frames) - _AROUND // 2, 0, len(at) - _AROUND)
+    around = first[:, None] + np.arange(_AROUND)
     t, y = at[around] - frames[:, None], values[around]
     i, j = np.triu_indices(_AROUND, 1)
     slope = np.median((y[:, j] - y[:, i]) / (t[:, j] - t[:, i]), axis=1)
