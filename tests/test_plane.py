@@ -2,7 +2,6 @@
 
 import json
 from itertools import pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ import vidsindy_lite as vl
 from vidsindy_lite import plane
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.dynamics import homogeneous
-from vidsindy_lite.vision import Track
+from vidsindy_lite.vision import Track, VideoInfo
 
 SCALE = 250.0  # pixels in a metre
 STICK = (100.0, 600.0, 100.0, 600.0 - SCALE / 2, 0.5)
@@ -41,14 +40,13 @@ def noisy(x, seed, error=4e-4):
     return x + np.random.default_rng(seed).normal(0, error, x.shape)
 
 
-def filmed(monkeypatch, pixels, fps=30.0):
+def filmed(monkeypatch, pixels, fps=30.0, frames=None):
     """As if a film showed the target there."""
     found, asked = Track(np.asarray(pixels), np.ones(len(pixels)), "motion"), []
-    monkeypatch.setattr(plane, "track", lambda *what: asked.append(what) or found)
+    monkeypatch.setattr(vl.vision, "track", lambda *what: asked.append(what) or found)
     monkeypatch.setattr(plane, "frame_clock", lambda path: np.arange(len(pixels), dtype=float))
-    monkeypatch.setattr(
-        plane, "video_info", lambda path: SimpleNamespace(fps=fps, size=(1280, 720))
-    )
+    info = VideoInfo(len(pixels) if frames is None else frames, fps, (1280, 720))
+    monkeypatch.setattr(plane, "video_info", lambda path: info)
     return asked
 
 
@@ -160,6 +158,12 @@ def test_what_is_no_scale_is_refused(monkeypatch, given, message):
 # ---------------------------------------------------------------------------------------- the whole
 
 
+def test_a_film_that_was_cut_off_is_told(monkeypatch):
+    filmed(monkeypatch, pixels_of(flight()[1]), frames=60)
+    with pytest.raises(ValueError, match="throw.mp4 must hold the 60 frames that its header"):
+        vl.discover_from_video("throw.mp4", STICK)
+
+
 def test_the_error_of_the_length_is_that_of_g(monkeypatch):
     monkeypatch.setattr(plane, "TILTED", 0.0)
     filmed(monkeypatch, pixels_of(noisy(flight()[1], 0)))
@@ -228,7 +232,7 @@ def test_the_command_writes_g_with_its_error(monkeypatch, tmp_path, capsys):
     length = ",".join(map(str, STICK))
     given = ["discover", str(film), "--length", length, "--out", str(tmp_path / "law")]
     assert main([*given, "--hint", "3,100,90,20,30"]) == 0
-    assert asked == [(str(film), "auto", vl.Hint(frame=3, box=(100, 90, 20, 30)))]
+    assert asked == [(film, "auto", vl.Hint(frame=3, box=(100, 90, 20, 30)))]
     assert "status: ok" in capsys.readouterr().out
     data = json.loads((tmp_path / "law" / "result.json").read_text("utf-8"))
     assert abs(data["g"]["value"] - 9.81) < 2 * data["g"]["error"] < 0.8

@@ -163,14 +163,10 @@ def check_rows(name: str, values: ArrayLike, width: int) -> Floats:
 
 def check_tracks(tracks: Sequence[ArrayLike], cameras: int | None = None) -> list[Floats]:
     """Pixels of the target in each camera, (n_i, 2) each; so many if given."""
-    is_array = isinstance(tracks, np.ndarray) and tracks.ndim
-    if not (is_array or isinstance(tracks, list | tuple)) or not len(tracks):
-        raise ValueError(
-            f"tracks: must be a list of arrays (n, 2), one per camera, got {shown(tracks)}"
-        )
-    if cameras is not None and len(tracks) != cameras:
-        raise ValueError(f"tracks: must be one per camera, got {len(tracks)} for {cameras} cameras")
-    checked = [check_rows(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
+    given = check_items("tracks", tracks, cameras, "camera")
+    if not given:
+        raise ValueError("tracks: must be one per camera, got none")
+    checked = [check_rows(f"tracks[{i}]", track, 2) for i, track in enumerate(given)]
     for i, track in enumerate(checked):
         largest = np.nanmax(np.abs(track), initial=0.0)
         if largest > FARTHEST:

@@ -10,7 +10,6 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import chain, repeat
 from pathlib import Path
 from typing import Any, cast
 
@@ -177,7 +176,7 @@ def observe(
     hints = [None] * len(files) if hints is None else hints
     asked = check_items("hints", hints, len(files), "video")
     seen = [
-        _track_one(path, shot.frames, detector, hint, targets)
+        tracked(path, shot.frames, detector, hint, targets)
         for (path, shot), hint in zip(films, asked, strict=True)
     ]
     tracks = [np.hstack([track.pixels for track in found]) for found in seen]
@@ -294,8 +293,8 @@ def _observed(
                 f"lags: must make the views agree, got ({cameras.list_lags(lags)}) frames where "
                 f"({cameras.list_lags(best.frames)}) do: leave them out, or check them"
             )
-    used = best.frames if lags is None else lags
-    tracks = replace(films, lags=used, rates=best.rates).aligned
+    told = best if lags is None else replace(best, frames=lags, errors=0 * lags, warnings=())
+    tracks = replace(films, lags=told.frames, rates=best.rates).aligned
     with refusing("cameras", raw, names):
         learned = cameras.learn_cameras(tracks, rig)
     missed = cameras.disagreement(tracks, learned)
@@ -303,11 +302,10 @@ def _observed(
         left = max(cameras.disagreement(affine.tracks, affine.rig), default=0.0)
         if max(missed) > max(cameras.BETTER * left, cameras.DISAGREEMENT):
             return affine
-    told = best
     if lags is not None:
-        told = replace(best, frames=lags, errors=0 * lags, residual=max(missed), warnings=())
+        told = replace(told, residual=max(missed))
     modes = cameras.systematic_errors(raw, rig, learned, told)
-    disagreeing = _rig_warnings(missed, tracks, rig, learned, names, used, best)
+    disagreeing = _rig_warnings(missed, tracks, rig, learned, names, told.frames, best)
     warnings = (*first, *disagreeing, *learned.warnings, *doubts, *told.warnings)
     return _concluded(raw, tracks, learned, told, clock, modes, warnings)
 
@@ -414,10 +412,16 @@ def _smoothed(t: Floats, values: Floats) -> Floats:
     return clean
 
 
-def _track_one(
-    path: Path, frames: int, detector: str | os.PathLike, hint: Hint | None, targets: int
+def tracked(
+    path: Path, frames: int, detector: str | os.PathLike, hint: Hint | None, targets: int = 1
 ) -> tuple[vision.Track, ...]:
-    """Track the targets of a video that should have so many frames."""
+    """The tracks of the targets of a video that should have so many frames.
+
+    Raises
+    ------
+    ValueError
+        If fewer can be read.
+    """
     one = targets == 1
     found = (vision.track(path, detector, hint),) if one else vision.track_targets(path, targets)
     if len(found[0].pixels) != frames:
@@ -607,14 +611,12 @@ def discover_from_videos(
         See `observe` and `discover`. What can be told before a video is tracked is.
     """
     check_integer("targets", targets, least=1)
-    how, unasked = checked(degree, library, order, origin, orientation, seed, 3 * targets)
-    how |= {"progress": progress}
+    law = law_options(degree, library, order, origin, orientation, seed, progress, 3 * targets)
     seen = observe(
         paths, rig, t, lags=lags, detector=detector, hints=hints, targets=targets,
         progress=progress,
     )  # fmt: skip
-    names = [Path(path).name for path in paths]
-    return _with_law(seen, names, how, unasked)
+    return _with_law(seen, [Path(path).name for path in paths], law)
 
 
 def discover_from_tracks(
@@ -664,8 +666,7 @@ def discover_from_tracks(
         If a file is missing or holds no track, if times are given twice or not at all, or as
         `observe_tracks` and `discover` do.
     """
-    how, unasked = checked(degree, library, order, origin, orientation, seed)
-    how |= {"progress": progress}
+    law = law_options(degree, library, order, origin, orientation, seed, progress)
     check_instance("rig", rig, Rig)
     read = _read(tracks, rig, individual)
     names, pixels = [track.name for track in read], [track.pixels for track in read]
@@ -673,30 +674,28 @@ def discover_from_tracks(
     seen = observe_tracks(pixels, rig, times, lags=lags, names=names, progress=progress)
     doubts = [*(warning for track in read for warning in track.warnings), *doubts]
     seen = replace(seen, warnings=(*seen.warnings, *doubts))
-    return _with_law(seen, names, how, unasked)
+    return _with_law(seen, names, law)
 
 
-def checked(
+def law_options(
     degree: int | None,
     library: Library | None,
     order: int | str,
     origin: str,
     orientation: str,
     seed: int,
+    progress: bool | None,
     coordinates: int = 3,
-) -> tuple[dict[str, Any], bool]:
-    """What `discover` takes beside the path, checked before anything is tracked.
-
-    And whether nothing is asked of the law.
-    """
+) -> dict[str, Any]:
+    """What `discover` takes beside the path, checked before anything is tracked."""
     terms = dynamics.check_library(degree, library)
     dynamics.check_order(order, origin)
     dynamics.check_orientation(orientation, terms, coordinates, origin)
     dynamics.Form.of(dynamics.variable_names(coordinates), terms, 2 if order == 2 else 1)
-    check_integer("seed", seed)
-    chosen = {"order": order, "origin": origin, "orientation": orientation}
-    unasked = degree is None and library is None and order == "auto"
-    return {"library": terms, "seed": seed} | chosen, unasked
+    return {
+        "degree": degree, "library": library, "order": order, "origin": origin,
+        "orientation": orientation, "seed": check_integer("seed", seed), "progress": progress,
+    }  # fmt: skip
 
 
 def _driven(law: dynamics.PolynomialSystem) -> str:
@@ -718,10 +717,8 @@ def _read(
     tracks: Sequence[ArrayLike | str | os.PathLike], rig: Rig, individual: str | None
 ) -> list[TrackFile]:
     """All tracks, those of files read, v down in the images of the rig."""
-    if not isinstance(tracks, list | tuple | np.ndarray):
-        raise ValueError(f"tracks: must be a list of arrays or of files, got {shown(tracks)}")
     read: list[TrackFile] = []
-    for given in tracks:
+    for given in check_items("tracks", tracks, of="camera"):
         if isinstance(given, str | os.PathLike):
             read += vision.read_tracks(given, individual)
         else:
@@ -729,11 +726,10 @@ def _read(
             read.append(TrackFile(name, check_rows(name, cast("ArrayLike", given), 2), None))
     # Files that count frames from the start of their videos may begin at different ones.
     first = min((track.start for track in read), default=0)
-    heights = chain((camera.image_size[1] for camera in rig.cameras), repeat(0))
-    for i, (one, height) in enumerate(zip(read, heights, strict=False)):
-        rows = (one.start - first, 0), (0, 0)
-        read[i] = replace(one, pixels=np.pad(one.downwards(height), rows, constant_values=np.nan))
-    return read
+    for i, (one, camera) in enumerate(zip(read, rig.cameras, strict=False)):
+        pixels, rows = one.downwards(camera.image_size[1]), ((one.start - first, 0), (0, 0))
+        read[i] = replace(one, pixels=np.pad(pixels, rows, constant_values=np.nan))
+    return read  # another number of tracks than of cameras is refused where they are observed
 
 
 def _times(
@@ -761,24 +757,23 @@ def _times(
     return [np.arange(len(track.pixels)) / given for track in read], doubts
 
 
-def _with_law(
-    seen: Observation, names: Sequence[str], how: dict[str, Any], default: bool
-) -> VideoDiscovery:
+def _with_law(seen: Observation, names: Sequence[str], law: dict[str, Any]) -> VideoDiscovery:
     """An observation with the law that it obeys, given what else `discover` takes.
 
     In a frame that is any affine map of space, the default is a law that is linear in any other.
     """
+    default = all(law[name] in (None, "auto") for name in ("degree", "library", "order"))
     if default and isinstance(seen.rig.cameras[0], cameras.AffineCamera):
-        how |= {"library": Library.polynomial(1), "order": 2}
+        law |= {"degree": 1, "order": 2}
     moves = np.nanmin(seen.x, axis=0) < np.nanmax(seen.x, axis=0)  # in a plane or on a line
     with refusing("law", seen.tracks, names):
         if not moves.any():
             raise ValueError("tracks: must show a target that moves, got one that stands still")
         x, modes = seen.x[:, moves], seen.systematic[..., moves]
-        found = dynamics.discover(seen.t, x, systematic=modes, **how)
+        found = dynamics.discover(seen.t, x, systematic=modes, **law)
     # Who keeps the law alone keeps the doubts about what it was found in.
-    law = replace(found, warnings=(*seen.warnings, *found.warnings))
-    return VideoDiscovery(**vars(seen) | {"warnings": law.warnings}, discovery=law)
+    found = replace(found, warnings=(*seen.warnings, *found.warnings))
+    return VideoDiscovery(**vars(seen) | {"warnings": found.warnings}, discovery=found)
 
 
 # ----------------------------------------------------------------------------------------- refusals

@@ -18,8 +18,8 @@ from .arrays import Floats
 from .cameras import Lags, OrthographicCamera, Rig
 from .checks import check_array, check_number, check_positive, check_vector, shown
 from .dynamics import Discovery, Round, Swing, discover, homogeneous, on_circle, smooth
-from .pipeline import VideoDiscovery, check_found, checked, refusing
-from .vision import Hint, check_detector, frame_clock, track, video_info
+from .pipeline import VideoDiscovery, check_found, law_options, refusing, tracked
+from .vision import Hint, check_detector, frame_clock, video_info
 
 MARK = 1.0
 """Standard error of a mark that is set by hand, in pixels."""
@@ -152,7 +152,7 @@ def discover_from_video(
     >>> print(found, found.g)
     """
     check_detector(detector)
-    checked(degree, None, order, "learn", "data", seed, 2)
+    law_options(degree, None, order, "learn", "data", seed, progress, 2)
     share = check_number("length_error", length_error)
     if not 0 <= share < 1:
         raise ValueError(f"length_error: must be a share of the length, 0 to 1, got {share}")
@@ -172,7 +172,7 @@ def discover_from_video(
         scale_error=error, image_size=shot.size,
     )  # fmt: skip
     rig = Rig((camera,), note=f"the plane of the motion, places in {unit}{scale}")
-    seen = track(path, detector, hint)
+    (seen,) = tracked(Path(path), shot.frames, detector, hint)
     check_found([seen.pixels], [name], 1)
     t, x = frame_clock(path) / rate, mapped(to_plane, seen.pixels)
     known = slice(3 if corners is None else 1) if pixels else slice(0)

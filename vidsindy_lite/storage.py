@@ -20,6 +20,7 @@ from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
+from xml.etree.ElementTree import XMLPullParser
 
 import cv2
 import numpy as np
@@ -136,10 +137,9 @@ def read_tree(name: str, path: Path, suffix: str) -> Any:
 def _depth(text: str, suffix: str) -> int:
     """How deeply a tree is nested at most: never less than it is."""
     if suffix == ".xml":
-        first, *rest = text.split("<!--")
-        text = first + "".join(part.partition("-->")[2] for part in rest)
-        tags = re.findall(r"<(/?)[^\s/<>!?][^<>]*?(/?)>", text)
-        steps = [0 if closed else -1 if ends else 1 for ends, closed in tags]
+        parser: XMLPullParser = XMLPullParser(("start", "end"))
+        parser.feed(text)
+        steps = [1 if event[0] == "start" else -1 for event in parser.read_events()]
         ahead = [""]
     else:
         text = re.sub(r'"(?:\\.|[^"\\\n])*"|#.*', "", text)  # brackets there open nothing

@@ -266,7 +266,7 @@ def test_names_of_notebooks(tiny):
 
 
 def test_what_makes_no_sense_is_refused(tiny, tmp_path, monkeypatch, capsys):
-    with pytest.raises(ValueError, match="profile: expected one of full, quick, got 'small'"):
+    with pytest.raises(ValueError, match="profile: must be one of full, quick, got 'small'"):
         run(profile="small", root=tiny.root)
     tiny.write("01_first")
     for name in ("first", "01_f", ""):

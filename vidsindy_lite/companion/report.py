@@ -48,7 +48,6 @@ PAGE, DATA, RIG, TRACKS = FILES = ("report.html", "result.json", "rig.toml", "tr
 FORMAT = 1  # of result.json: counts up when what is in it changes its meaning
 
 _TITLES = ("<title>Law of a moving target", "<title>No law: ")  # of pages that are ours
-_BEGIN = '{\n "format": '  # of data that are
 _HEAD = 1000  # characters
 
 FRAMES = 24  # of each video on the page
@@ -126,9 +125,7 @@ def check_folder_is_free(folder: str | Path) -> Path:
         rule = "must be one that exists and can be written to"
         raise ValueError(f"out: the {whose} {rule}, got '{folder}'") from None
     strange = [name for name in FILES if (folder / name).exists()]
-    page, data = folder / PAGE, folder / DATA  # an interruption may have left the data alone
-    is_earlier = _holds(page, *_TITLES) or not page.exists() and _holds(data, _BEGIN)
-    if strange and not is_earlier:
+    if strange and not _holds(folder / PAGE, *_TITLES):
         raise ValueError(
             f"out: must hold no files of the names {', '.join(FILES)} but of an earlier report, "
             f"got '{folder}' with {', '.join(strange)}"
@@ -172,7 +169,7 @@ def write_report(
     figures = bar(None, "report", iterable=_figures(found, paths), total=total)
     film = None if paths is None else law_over_videos(found, paths)
     drawn = {"figures": figures, "film": film, "limit": DISAGREEMENT}
-    return _put(folder, files | {PAGE: page("report.html", found=found, **drawn, **content)})
+    return _put(folder, {PAGE: page("report.html", found=found, **drawn, **content)} | files)
 
 
 def write_refusal(
@@ -211,11 +208,14 @@ def write_refusal(
     look = _picture(_look, paths, sizes, shown, refused.tracks, shown)
     frames = np.arange(max(len(track) for track in refused.tracks), dtype=float)
     files = _data(content, frames, refused.tracks, "frame")
-    return _put(folder, files | {PAGE: page("refusal.html", look=look, **content)})
+    return _put(folder, {PAGE: page("refusal.html", look=look, **content)} | files)
 
 
 def _put(folder: Path, texts: Mapping[str, str]) -> Path:
-    """Put the files of a report into its folder, and take away those of an earlier one."""
+    """Put the files of a report into its folder, and take away those of an earlier one.
+
+    The page is the first, which tells whose the others are.
+    """
     check_folder_is_free(folder)  # again: a while has passed
     is_new = not folder.exists()
     try:
@@ -269,8 +269,8 @@ def summary(found: VideoDiscovery, paths: Videos, options: Options = None) -> di
         length = length[np.isfinite(length)]
         cameras.append({
             "video": names[i], "frames": shot.frames, "fps": shot.fps, "image_size": shot.size,
-            **_parts(camera, "model", "position", "normal", "scale", "scale_error", "angle"),
-            **_parts(camera, "homography"),
+            **_parts(camera, "model", "position", "normal", "scale", "scale_error", "angle",
+                     "homography"),
             "lag": found.lags.frames[i], "lag_error": found.lags.errors[i],
             "share_of_frames_seen": seen.mean(),
             "residual_rms": np.sqrt(np.mean(length**2)) if len(length) else np.nan,

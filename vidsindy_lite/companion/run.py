@@ -30,6 +30,7 @@ from nbformat import NotebookNode
 from papermill.exceptions import strip_color
 from tqdm import tqdm
 
+from ..checks import check_choice
 from ..storage import PACKAGE, code_hash, repository_root, write_file
 from .artifacts import read_records, with_palette, write_index
 from .compare import outdated, replace, same_notebook
@@ -142,8 +143,7 @@ def run(
         If there is no repository around the working directory.
     """
     root = repository_root() if root is None else Path(root).resolve()
-    if profile not in PROFILES:
-        raise ValueError(f"profile: expected one of {', '.join(PROFILES)}, got {profile!r}")
+    check_choice("profile", profile, PROFILES)
     output = root if profile == "full" else root / "build" / "quick"
     chosen, figures = select_notebooks(notebooks, root), output / "figures"
     known = {path.stem for path in find_notebooks(root)}
