@@ -140,9 +140,9 @@ def align(before: list[Ground], after: list[Floats32], guess: Floats) -> Aligned
     ----------
     before : list of Ground
     after : list of ndarray
-        Of `pyramid`.
+        The `levels` of a `Look`.
     guess : ndarray, shape (3, 3)
-        In pixels of the images of which the pyramids are.
+        In pixels of the images of which these are levels.
     """
     found, fitted = _as_similarity(guess, 2 * np.array(before[0].grey.shape[::-1])), None
     for level in range(len(before), 0, -1):
