@@ -268,7 +268,7 @@ def _plainest(seen: Candidates, rows: Ints) -> Spot:
     return _spot(seen, rows[np.argmax(worth)])
 
 
-def _spot(seen: Candidates, row: np.intp) -> Spot:
+def _spot(seen: Candidates, row: np.integer) -> Spot:
     """Where a candidate is, and how large, four pixels at least."""
     return Spot(int(seen.frame[row]), seen.centre[row], np.maximum(seen.box[row, 2:], 4))
 
@@ -485,8 +485,7 @@ def finished(
     elif np.isfinite(torn) and torn > max(LOOSE, 0.02 * side):
         doubts += (f"the outline of the target changes from frame to frame: its place is known to "
                    f"{torn:.1f} px only",)  # fmt: skip
-    if np.median(motion.errors[at[good]]) > LOOSE:
-        error = np.median(motion.errors[at[good]])
+    if (error := np.median(motion.errors[at[good]])) > LOOSE:
         doubts += (f"the camera moves, and its motion is known to {error:.1f} px only",)
     return _as_track(pixels, errors, motion, doubts), bound
 
