@@ -157,6 +157,7 @@ def test_noise_and_a_few_things_tell_nothing(things):
         views.append(np.clip(wall + rng.normal(0, 3, wall.shape), 0, 255).astype(np.uint8))
     assert align(*views).error > 2
     assert things or stands_still(views) is None
+    assert align(*(view[:30] for view in views)) is None  # too small to tell
 
 
 def test_all_pixels_tell_of_a_motion_where_there_are_no_corners():

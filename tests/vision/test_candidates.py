@@ -11,6 +11,7 @@ from vidsindy_lite.vision.candidates import (
     TOLD,
     Appearance,
     Candidates,
+    Spot,
     best_path,
     components,
     followed,
@@ -161,7 +162,7 @@ def test_it_is_followed_both_ways_from_where_it_is_known(tmp_path):
     found = Candidates.of(5, np.eye(3), np.column_stack(
         [two, two - 8, np.full((2, 2), 17.0), np.full(2, 200.0), np.zeros((2, 6)), np.ones(2)]
     ))  # fmt: skip
-    looks = followed(frames, maps, found, (10, PLACES[10], np.array([17.0, 17])), np.zeros(2))
+    looks = followed(frames, maps, found, Spot(10, PLACES[10], np.array([17.0, 17])), np.zeros(2))
     shown = ~np.isin(np.arange(N), hidden)
     assert np.linalg.norm(looks.box[shown, :2] - PLACES[shown], axis=1).max() < 1.5
     assert looks.fit[10] == 1

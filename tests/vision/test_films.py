@@ -34,7 +34,6 @@ def texture(rng, width, height):
 def disc(image, place, radius, colour):
     centre = tuple(np.rint(16 * np.asarray(place)).astype(int).tolist())
     cv2.circle(image, centre, round(16 * radius), colour, -1, cv2.LINE_AA, 4)
-
     return image
 
 

@@ -105,8 +105,6 @@ def test_what_reaches_the_border_of_the_image_is_not_inside(corner, inside):
 FRAMES = np.arange(30.0)
 WAY = np.column_stack([20 + 3 * FRAMES, 90 - 2 * FRAMES + 0.1 * FRAMES**2])
 ALL = np.ones(30, bool)
-
-
 EVEN = np.zeros((60, 2))  # skewness of a disc
 SIXTY = np.arange(60)
 

@@ -140,24 +140,24 @@ def align(before: list[Ground], after: list[Floats32], guess: Floats) -> Aligned
     ----------
     before : list of Ground
     after : list of ndarray
-        Of `pyramid`.
+        The `levels` of a `Look`.
     guess : ndarray, shape (3, 3)
-        In pixels of the images of which the pyramids are.
+        In pixels of the images of which these are levels.
     """
-    found, fitted = _as_similarity(guess, 2 * np.array(before[0].grey.shape[::-1])), None
+    if not before:  # images too small for a pyramid
+        return None
+    size = 2 * np.array(before[0].grey.shape[::-1])
+    found = Aligned(_as_similarity(guess, size), np.inf)
     for level in range(len(before), 0, -1):
         scale, back = (np.diag([x, x, 1.0]) for x in (0.5**level, 2.0**level))
-        here = scale @ found @ back
+        here = scale @ found.map @ back
         # Grey levels from which on a pixel is left aside.
         loose = 40.0 if level > 1 else 0.0
         fitted = _fit(before[level - 1], after[level - 1], here, scale[0, 0], loose)
         if fitted is None:
             return None
-        found = back @ fitted.map @ scale
-    if fitted is None:  # images too small for a pyramid
-        return None
-    error = 2 * fitted.error
-    return Aligned(found, error if error < _STEP else np.inf)
+        found = Aligned(back @ fitted.map @ scale, 2 * fitted.error)
+    return found if found.error < _STEP else found._replace(error=np.inf)
 
 
 def _as_similarity(guess: Floats, size: Ints) -> Floats:
@@ -253,8 +253,6 @@ def _error(slopes: Floats32, pull: Floats32, information: Floats) -> float:
     `pull` (h, w) of each pixel; what the pixels do not tell is known by the guess only.
     """
     height, width = (side // PARTS for side in pull.shape)
-    if not height or not width:
-        return np.inf
     pulls = (slopes * pull)[:, : height * PARTS, : width * PARTS]
     means = np.array([_by_blocks(by) for by in pulls], float).reshape(6, -1)
     sums = height * width * means

@@ -48,6 +48,14 @@ _WIDE = 2.6  # width of the patch, in widths of the target
 _BINS = 4096  # of a histogram: 16 levels a colour
 
 
+class Spot(NamedTuple):
+    """Where a target is known: number of a frame, and centre (2,) and size (2,) there, reduced."""
+
+    frame: int
+    centre: Floats
+    size: Floats
+
+
 @dataclass(frozen=True)
 class Hint:
     """Which of the things that move is the target: a box around it in one frame, or its colour.
@@ -90,10 +98,8 @@ class Hint:
                 raise ValueError(f"colour: must be red, green, blue, 0 to 255 each, got {colour}")
             object.__setattr__(self, "colour", colour)
 
-    def boxed(
-        self, size: tuple[int, int], frames: int, factor: int
-    ) -> tuple[int, Floats, Floats] | None:
-        """Frame, middle and sides of the box, in frames reduced by a factor; None without a box.
+    def boxed(self, size: tuple[int, int], frames: int, factor: int) -> Spot | None:
+        """The box, in frames that are reduced by a factor; None without a box.
 
         Raises
         ------
@@ -111,7 +117,7 @@ class Hint:
                 f"box: must have its middle in the image of {size[0]} x {size[1]} pixels, "
                 f"got {as_written(self.box)}"
             )
-        return self.frame, (middle - (factor - 1) / 2) / factor, sides / factor
+        return Spot(self.frame, (middle - (factor - 1) / 2) / factor, sides / factor)
 
     def likeness(self, colours: Floats, grounds: Floats) -> Floats:
         """How like the colour that is told things (m, 3) are before grounds (m, 3), from 0 to 1.
@@ -253,8 +259,6 @@ def candidates(
         ]
         found.append(Candidates.of(i, here, _distinct(np.concatenate(rows))))
         found[-1].colour[:] /= lit
-    if not found:
-        return Candidates.of(0, np.eye(3), np.zeros((0, 14))), lights
     return Candidates.joined(found), lights
 
 
@@ -365,20 +369,20 @@ def uncommon(found: Candidates, targets: int) -> Candidates:
 
 
 class Motion(NamedTuple):
-    """Rows of the candidates, and its value, as far as it travels and keeps its outline."""
+    """A path: its rows of the candidates, and its value."""
 
     rows: Ints
     rating: float
 
 
-def best_path(seen: Candidates, *, away: bool = False) -> tuple[Ints, float]:
-    """The rows of the path of the highest value, and that value.
+def best_path(seen: Candidates, *, away: bool = False) -> Motion:
+    """The path of the highest value.
 
     A target may be away for a few frames, or for any time: then a candidate follows one of those
     before it, or one of the best of all that are older.
     """
     if not len(seen.frame):
-        return np.zeros(0, int), 0.0
+        return Motion(np.zeros(0, int), 0.0)
     size = seen.size + 2
     # Of quality, that a candidate must exceed to be worth anything.
     value, before = seen.quality - 0.2, np.full(len(size), -1)
@@ -412,7 +416,7 @@ def best_path(seen: Candidates, *, away: bool = False) -> tuple[Ints, float]:
     while row >= 0:
         rows.append(row)
         row = int(before[row])
-    return np.array(rows[::-1]), float(value.max())
+    return Motion(np.array(rows[::-1]), float(value.max()))
 
 
 def _penalty(
@@ -439,7 +443,10 @@ def _penalty(
 
 
 def plainest_paths(seen: Candidates, most: int = 3) -> list[Motion]:
-    """Several paths that have nothing in common, the plainest first."""
+    """Several paths that have nothing in common, the plainest first.
+
+    What counts is the value of each, as far as it travels and keeps its outline.
+    """
     left, found = np.arange(len(seen.frame)), []
     for _ in range(most):
         rows, value = best_path(seen.only(left))
@@ -567,9 +574,7 @@ def _top(values: Floats) -> float:
     return float(np.clip(0.5 * (before - after) / (before - 2 * here + after - 1e-9), -0.5, 0.5))
 
 
-def followed(
-    frames: Reel, maps: Floats, found: Candidates, seed: tuple[int, Floats, Floats], pace: Floats
-) -> Looks:
+def followed(frames: Reel, maps: Floats, found: Candidates, seed: Spot, pace: Floats) -> Looks:
     """Follow a target by its looks, both ways.
 
     Parameters
@@ -579,8 +584,7 @@ def followed(
     maps : ndarray, shape (n, 3, 3)
         Of reduced frames.
     found : Candidates
-    seed : int, ndarray, ndarray
-        A frame in which the target is known, its centre and size there, in reduced pixels.
+    seed : Spot
     pace : ndarray, shape (2,)
         By how much a frame it moves there: what is small is soon beyond its looks.
     """
@@ -592,7 +596,7 @@ def followed(
     first, middle, size = seed
     box[first], fit[first] = [*middle, *size], 1.0
     for way in (1, -1):
-        size, usual = seed[2].astype(float), 1.0
+        size, usual = seed.size.astype(float), 1.0
         last = [(first, carry(maps[first], middle[None])[0])]
         for i, frame in _in_order(frames, first, way, n):
             here = np.s_[bounds[i] : bounds[i + 1]]

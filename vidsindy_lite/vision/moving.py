@@ -45,6 +45,7 @@ from .candidates import (
     Hint,
     Looks,
     Motion,
+    Spot,
     best_path,
     candidates,
     followed,
@@ -98,16 +99,18 @@ class Track:
 
 
 class Film(NamedTuple):
-    """What is known of a film before its target: `small`, `maps` and `plate` are of reduced frames.
+    """What is known of a film before its target.
 
-    `lights` (m, 3) say how much brighter each of its samples is than most; `doubts`, why its camera
-    may move other than `motion` says.
+    `samples` and `motion` are of whole frames, `small` and `maps` the same of reduced ones;
+    `sampled` are the numbers of the samples, and `lights` (m, 3) say how much brighter each is than
+    most; `doubts`, why the camera may move other than `motion` says.
     """
 
     frames: Reel
+    samples: Image
     motion: CameraMotion
-    maps: Floats
     small: Image
+    maps: Floats
     sampled: Ints
     lights: Floats32
     doubts: tuple[str, ...]
@@ -118,29 +121,32 @@ class Film(NamedTuple):
         return self.frames.factor
 
     @classmethod
-    def of(cls, frames: Reel, samples: Image, *, rests: bool = False) -> Self:
+    def of(cls, path: str | os.PathLike, *, rests: bool = False) -> Self:
         """From its sampled frames, and from all of them if its camera may move."""
-        info, factor = frames.info, frames.factor
-        numbers = sampled(info.frames)[: len(samples)]
-        small = np.array([reduce(sample, factor) for sample in samples])
+        frames = Reel(path, LONGEST)
+        samples = sample_frames(frames)
+        numbers = sampled(frames.info.frames)[: len(samples)]
+        small = np.array([reduce(sample, frames.factor) for sample in samples])
         doubts: tuple[str, ...] = ()
-        motion = at_rest(info.frames)
+        motion = at_rest(frames.info.frames)
         if not rests:
             motion, doubts = camera_motion(frames, small, numbers)
         elif stands_still(small) is False:
             doubts = ("the camera moves, and its motion is part of the track",)
         numbers = np.minimum(numbers, len(motion.maps) - 1)
-        maps, known = rescaled(motion.maps, factor), np.isfinite(motion.errors)
+        maps, known = rescaled(motion.maps, frames.factor), np.isfinite(motion.errors)
         lights = lights_of(small, maps[numbers], known[numbers])
-        return cls(frames, motion, maps, small, numbers, lights, doubts)
+        return cls(frames, samples, motion, small, maps, numbers, lights, doubts)
 
-    def plate(self, samples: Image, maps: Floats, boxes: Floats | None = None) -> Plate:
-        """The ground, without what is in boxes (n, 4) of the frames."""
-        known = np.isfinite(self.motion.errors[self.sampled])
+    def ground(self, boxes: Floats | None = None, *, whole: bool = False) -> tuple[Plate, float]:
+        """The ground, without what is in boxes (n, 4) of the frames, and the noise of a pixel."""
+        samples, maps = (self.samples, self.motion.maps) if whole else (self.small, self.maps)
+        here, known = maps[self.sampled], np.isfinite(self.motion.errors[self.sampled])
         hide = None if boxes is None else boxes[self.sampled]
         if hide is not None:  # in the others it may be anywhere
             known &= np.isfinite(hide[:, 0])
-        return Plate(samples, maps[self.sampled], known, hide, self.lights)
+        plate = Plate(samples, here, known, hide, self.lights)
+        return plate, noise_of(samples, here, plate)
 
 
 class Ways(NamedTuple):
@@ -156,12 +162,10 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
 
     Its camera `rests` if that is known.
     """
-    frames = Reel(path, LONGEST)
-    samples = sample_frames(frames)
-    film = Film.of(frames, samples, rests=rests)
+    film = Film.of(path, rests=rests)
     seen, lights = sighted(film)
-    n = min(len(film.maps), len(lights))
-    boxed = None if hint is None else hint.boxed(frames.info.size, n, film.factor)
+    n = len(lights)
+    boxed = None if hint is None else hint.boxed(film.frames.info.size, n, film.factor)
     seed = boxed and _tightened(seen, boxed)
     paths = _paths(seen, hint, seed)
     if not paths and seed is None:
@@ -183,8 +187,8 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
     if seed is None and len(rows) == n and not _rivals(paths):  # nothing is left to be told
         looks = Looks(np.full((n, 4), np.nan), np.zeros(n), np.ones(len(seen.frame)))
     else:
-        looks = followed(frames, film.maps[:n], seen, start, _pace(seen, rows, start[0]))
-    both = _together(seen, looks, film.maps, start[0], told=seed is not None)
+        looks = followed(film.frames, film.maps[:n], seen, start, _pace(seen, rows, start.frame))
+    both = _together(seen, looks, film.maps, start.frame, told=seed is not None)
     rows, _ = best_path(both, away=True)
     if len(rows) < _SHORTEST:
         return nothing(film.motion, n)
@@ -192,8 +196,7 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
     doubts = _doubts(film, seen, paths, ways) if hint is None else film.doubts
     if _differing(seen, both.only(rows)) < 0.5:
         doubts += (_LOOKS_ALONE,)
-    lens = lens_of(samples, film, ways)
-    views = viewed(film, lens, ways, lights)
+    views = viewed(film, lens_of(film, ways), ways, lights)
     if hint is not None and hint.colour is not None and any(views):
         colour = np.median([view.colour for view in views if view], axis=0)
         doubts += hint.unlike(colour)
@@ -219,8 +222,7 @@ def sighted(
     film: Film, boxes: Floats | None = None, targets: int = 1
 ) -> tuple[Candidates, list[Floats32]]:
     """What may be the target in each frame, and how bright the frame is."""
-    plate = film.plate(film.small, film.maps, boxes)
-    noise = noise_of(film.small, film.maps[film.sampled], plate)
+    plate, noise = film.ground(boxes)
     frames: Iterable[Image] = film.frames
     if noise > _LOUD:
         frames = (np.asarray(cv2.GaussianBlur(frame, (0, 0), 1.0), np.uint8) for frame in frames)
@@ -229,9 +231,7 @@ def sighted(
     return uncommon(found, targets), lights
 
 
-def _paths(
-    seen: Candidates, hint: Hint | None, seed: tuple[int, Floats, Floats] | None
-) -> list[Motion]:
+def _paths(seen: Candidates, hint: Hint | None, seed: Spot | None) -> list[Motion]:
     """The plainest paths, of what a hint allows."""
     if seed is not None:
         frame, centre, size = seed
@@ -241,7 +241,7 @@ def _paths(
         if not (here & near & alike).any():
             return []
         quality = np.where(here, np.where(near & alike, seen.quality + TOLD, -TOLD), seen.quality)
-        return [Motion(*best_path(seen._replace(quality=quality)))]
+        return [best_path(seen._replace(quality=quality))]
     liked = seen
     if hint is not None and hint.colour is not None:
         liked = seen._replace(quality=seen.quality * hint.likeness(seen.colour, seen.behind))
@@ -249,7 +249,7 @@ def _paths(
     return [path for path in plainest_paths(liked) if np.median(seen.quality[path.rows]) > 0.2]
 
 
-def _tightened(seen: Candidates, seed: tuple[int, Floats, Floats]) -> tuple[int, Floats, Floats]:
+def _tightened(seen: Candidates, seed: Spot) -> Spot:
     """A box that is drawn loosely around one plain thing, close around it."""
     frame, centre, size = seed
     here = (seen.frame == frame) & (np.abs(seen.centre - centre) < size / 4).all(axis=1)
@@ -258,15 +258,19 @@ def _tightened(seen: Candidates, seed: tuple[int, Floats, Floats]) -> tuple[int,
         return seed
     best = inside[seen.area[inside].argmax()]
     loose = seen.area[best] < 0.4 * 0.7 * size.prod()
-    return (frame, seen.centre[best], np.maximum(seen.box[best, 2:], 4)) if loose else seed
+    return _spot(seen, best) if loose else seed
 
 
-def _plainest(seen: Candidates, rows: Ints) -> tuple[int, Floats, Floats]:
-    """Frame, centre and size of the plainest view on a path, of about the usual size."""
+def _plainest(seen: Candidates, rows: Ints) -> Spot:
+    """The plainest view on a path, of about the usual size."""
     usual = np.median(seen.area[rows])
     worth = seen.quality[rows] - 0.5 * np.abs(np.log(seen.area[rows] / usual))
-    best = rows[np.argmax(worth)]
-    return int(seen.frame[best]), seen.centre[best], np.maximum(seen.box[best, 2:], 4)
+    return _spot(seen, rows[np.argmax(worth)])
+
+
+def _spot(seen: Candidates, row: np.integer) -> Spot:
+    """Where a candidate is, and how large, four pixels at least."""
+    return Spot(int(seen.frame[row]), seen.centre[row], np.maximum(seen.box[row, 2:], 4))
 
 
 def _pace(seen: Candidates, rows: Ints, frame: int) -> Floats:
@@ -283,7 +287,7 @@ def _rivals(paths: Sequence[Motion]) -> Sequence[Motion]:
 
 
 def _covering(
-    seen: Candidates, rows: Ints, n: int, seed: tuple[int, Floats, Floats] | None, *, rims: bool
+    seen: Candidates, rows: Ints, n: int, seed: Spot | None, *, rims: bool
 ) -> Floats | None:
     """Boxes (n, 4) of a target that covers its own ground in many frames, None if it does not.
 
@@ -291,8 +295,7 @@ def _covering(
     there is the target's place.
     """
     centre, size = seen.centre[rows], seen.box[rows, 2:]
-    inside = (np.abs(centre[:, None] - centre) < size / 2).all(axis=2).mean(axis=1)
-    if inside.max() < 0.35:
+    if _staying(centre, size) < 0.35:
         return None
     low = np.percentile(seen.box[rows, :2], 5, axis=0)
     high = np.percentile(seen.box[rows, :2] + seen.box[rows, 2:], 95, axis=0)
@@ -307,8 +310,15 @@ def _covering(
     boxes = np.full((n, 4), np.nan)
     boxes[seen.frame[rows]] = seen.box[rows]
     if seed is not None:  # its size is told
-        boxes[seen.frame[rows]] = np.column_stack([centre - seed[2] / 2, 0 * centre + seed[2]])
+        boxes[seen.frame[rows]] = np.column_stack([centre - seed.size / 2, 0 * centre + seed.size])
     return boxes
+
+
+def _staying(centre: Floats, size: Floats) -> float:
+    """In what share of its frames a target of these centres and sizes (k, 2) covers one place."""
+    with np.errstate(invalid="ignore"):
+        inside = (np.abs(centre[:, None] - centre) < size / 2).all(axis=2)
+    return float(inside.mean(axis=1).max())
 
 
 def _same(one: Floats, other: Floats) -> bool:
@@ -359,17 +369,13 @@ def _differing(seen: Candidates, path: Candidates) -> float:
     return float(np.mean([len(_there(seen, *place)) > 0 for place in places]))
 
 
-def lens_of(samples: Image, film: Film, *ways: Ways) -> Lens:
-    """What looks at targets in whole frames, of which these are samples."""
+def lens_of(film: Film, *ways: Ways) -> Lens:
+    """What looks at targets in whole frames."""
     boxes = None
     for way in ways:
-        centre, size = way.centre[film.sampled], way.box[film.sampled, 2:]
-        with np.errstate(invalid="ignore"):
-            inside = (np.abs(centre[:, None] - centre) < size / 2).all(axis=2)
-        if inside.mean(axis=1).max() > 0.25:
+        if _staying(way.centre[film.sampled], way.box[film.sampled, 2:]) > 0.25:
             boxes = way.box
-    plate = film.plate(samples, film.motion.maps, boxes)
-    return Lens(plate, noise_of(samples, film.motion.maps[film.sampled], plate))
+    return Lens(*film.ground(boxes, whole=True))
 
 
 def viewed(film: Film, lens: Lens, ways: Ways, lights: list[Floats32]) -> list[View | None]:
@@ -401,7 +407,7 @@ def _confidence(errors: Floats | float) -> Floats:
     return np.asarray(np.exp(-np.asarray(errors) / 3))
 
 
-def _spot(film: Film, seen: Candidates, path: Motion) -> str:
+def _example(film: Film, seen: Candidates, path: Motion) -> str:
     """Where somebody may look at what moves along a path."""
     row = path.rows[len(path.rows) // 2]
     u, v = film.factor * seen.centre[row]
@@ -417,7 +423,7 @@ def _doubts(film: Film, seen: Candidates, paths: list[Motion], ways: Ways) -> tu
         # It may be the target itself, after a gap.
         if not np.median(off / ways.box[at, 2:].max(axis=1)) < 1:
             told = ("something else moves about as plainly, "
-                    f"{_spot(film, seen, path)}: if that is the target, say so, "
+                    f"{_example(film, seen, path)}: if that is the target, say so, "
                     "target=Hint(frame=, box=)")  # fmt: skip
             return (*film.doubts, told)
     return film.doubts
@@ -479,15 +485,14 @@ def finished(
     elif np.isfinite(torn) and torn > max(LOOSE, 0.02 * side):
         doubts += (f"the outline of the target changes from frame to frame: its place is known to "
                    f"{torn:.1f} px only",)  # fmt: skip
-    if np.median(motion.errors[at[good]]) > LOOSE:
-        error = np.median(motion.errors[at[good]])
+    if (error := np.median(motion.errors[at[good]])) > LOOSE:
         doubts += (f"the camera moves, and its motion is known to {error:.1f} px only",)
     return _as_track(pixels, errors, motion, doubts), bound
 
 
 def _filled(
     found: Track, bound: float, film: Film, views: list[View | None], looks: Looks, ways: Ways,
-    seed: tuple[int, Floats, Floats] | None,
+    seed: Spot | None,
 ) -> Track:  # fmt: skip
     """A track with its gaps filled: where its motion leads, or where it is by its looks.
 
@@ -535,7 +540,7 @@ def _filled(
             # What hides a part of it draws its looks aside.
             if not view.inside or view.area < np.median([views[k].area for k in near]) / 1.5:
                 continue
-        pointed = seed is not None and i == seed[0]
+        pointed = seed is not None and i == seed.frame
         if not pointed and not (on[i] and looks.fit[i] > (0.7 if seed is None else 0.5) * usual):
             continue
         near = near[on[near]]
@@ -568,9 +573,7 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
         If the file is missing or no video.
     """
     check_integer("count", count, least=1)
-    frames = Reel(path, LONGEST)
-    samples = sample_frames(frames)
-    film = Film.of(frames, samples)
+    film = Film.of(path)
     seen, lights = sighted(film, targets=count)
     n = len(lights)
     # Paths of a target that may follow each other.
@@ -583,9 +586,9 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
     # Share of the frames in which one more thing moves, above which there is doubt.
     if longest is not None and len(longest.rows) >= 0.2 * n:
         doubts = (f"{Path(path).name}: one thing more moves than there are targets, "
-                  f"{_spot(film, seen, longest)}",)  # fmt: skip
+                  f"{_example(film, seen, longest)}",)  # fmt: skip
+    lens = lens_of(film, *ways)
     tracks = []
-    lens = lens_of(samples, film, *ways)
     for way, met in zip(ways, touching, strict=True):
         way.centre[met] = np.nan
         tracks.append(finished(viewed(film, lens, way, lights), film.motion, doubts)[0])

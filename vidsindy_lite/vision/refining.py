@@ -309,12 +309,11 @@ def swapped(frames: Ints, areas: Floats) -> int | None:
 def _left_out(frames: Ints, places: Floats, known: Ints) -> tuple[Floats, Floats]:
     """How far places are from where the three on both sides say, and how unsure that is: (m,) each.
 
-    Of those that are `known`. A quartic through six says it. Where a target turns within a few
-    frames, or some of them are missing, no polynomial is right, and a parabola says something else.
+    Of those that are `known`, five or more. A quartic through six says it. Where a target turns
+    within a few frames, or some are missing, no polynomial is right, and a parabola says something
+    else.
     """
     m, count = len(known), min(6, len(known) - 1)
-    if count < 4:
-        return np.zeros(m), np.full(m, np.inf)
     own = np.arange(m)[:, None]
     beside = np.clip(own - 3, 0, m - 1 - count) + np.arange(count)
     beside += beside >= own  # without itself

@@ -283,19 +283,16 @@ def _numbers(rows: list[list[str]], width: int, names: Sequence[str] = ()) -> Fl
 # ------------------------------------------------------------------------------ numbers into tracks
 
 
-def _matching(names: Sequence[str], individual: str | None) -> Sequence[str]:
-    """Those of the names that a user may mean by one: it, some of its words, or all and more."""
-    if individual is None:
-        return names
-    if individual in names:
-        return [individual]
-    said = set(individual.split())
-    return [name for name in names if said <= set(name.split()) or set(name.split()) <= said]
-
-
 def _chosen(names: Sequence[str], individual: str | None, *, lenient: bool) -> str:
-    """The target that is meant, or the only one there is; `lenient` if none need be called so."""
-    wanted = _matching(names, individual) or (names if lenient else [])
+    """The target that is meant, or the only one there is; `lenient` if none need be called so.
+
+    A user means one by its name, by some of the words in it, or by all of them and more.
+    """
+    if individual is not None and individual in names:
+        return individual
+    said = set((individual or "").split())
+    meant = [name for name in names if said <= set(name.split()) or set(name.split()) <= said]
+    wanted = meant or (names if lenient else [])
     if len(wanted) != 1:
         raise _several(wanted or names)
     return wanted[0]
@@ -329,20 +326,16 @@ def _of_series(
             axis = {"x": "u", "y": "v"}.get(match["axis"], match["axis"])
             found.setdefault((of["target"], int(of["camera"])), {})[axis] = match[0]
     found = {of: axes for of, axes in found.items() if axes.keys() & {"u", "v"}}
-    shown = {
-        of: axes
-        for of, axes in found.items()
-        if np.isfinite([columns[key] for key in axes.values()]).any()
+    seen = {
+        of for of, axes in found.items() if np.isfinite([columns[k] for k in axes.values()]).any()
     }
-    target = _chosen(sorted({one for one, _ in shown or found}), individual, lenient=lenient)
+    target = _chosen(sorted({one for one, _ in seen or found}), individual, lenient=lenient)
     shared = {key: x for key, x in columns.items() if key in _FRAME or _TIME.fullmatch(key)}
     # Of DLTdv and Argus the first pixel is 1; of Argus rows count up from the lowest one.
     below = told[0].groupdict().get("below")
     tracks = []
-    for one, camera in sorted(found):
-        if one != target:
-            continue
-        axes = found[one, camera]
+    for camera in sorted(camera for one, camera in found if one == target):
+        axes = found[target, camera]
         if not {"u", "v"} <= axes.keys():
             raise ValueError(f"must have columns of both axes, got only {', '.join(axes.values())}")
         own = {axis: columns[key] for axis, key in axes.items()}
@@ -397,16 +390,15 @@ def _track(
     if pair == ("pixelx", "pixely") or (of_world and "t" in columns):
         pixels -= 0.5
     frames = next((columns[key] for key in _FRAME if key in columns), None)
-    counts = frames is not None and _counts(frames)
     clock = next((match for key in columns if (match := _TIME.fullmatch(key))), None)
     if clock is None:
-        if frames is not None and not counts:
+        if frames is None:
+            return TrackFile(name, pixels, None, doubts, upwards=upwards)
+        if not _counts(frames):
             raise ValueError(
                 "must have increasing whole numbers of frames within ten million, got "
                 + ", ".join(f"{frame:.10g}" for frame in frames[:4])
             )
-        if frames is None:
-            return TrackFile(name, pixels, None, doubts, upwards=upwards)
         whole = (frames - frames[0]).astype(int)
         filled = np.full((whole[-1] + 1, 2), np.nan)
         filled[whole] = pixels

@@ -90,17 +90,12 @@ def track(
     else:
         found = _link_detections(path, detector)
     lacking, stated = found.warnings + _lost(found), video_info(path).frames
-    if target is not None and target.colour is not None and not _seen(found):
+    if target is not None and target.colour is not None and np.isnan(found.pixels).all():
         lacking += (f"nothing was found of the colour {as_written(target.colour)} as told",)
     if len(found.pixels) != stated:
         lacking += (f"{len(found.pixels)} of its {stated} frames can be read: it is cut off",)
     doubts = tuple(f"{Path(path).name}: {doubt}" for doubt in lacking)
     return replace(found, warnings=doubts)
-
-
-def _seen(found: Track) -> float:
-    """Share of the frames in which the target is seen."""
-    return float(np.isfinite(found.pixels[:, 0]).mean())
 
 
 def _lost(found: Track) -> tuple[str, ...]:
@@ -162,7 +157,7 @@ def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
         row[13] = d.confidence
     seen = Candidates.of(np.array([i for i, _ in flat], int), np.eye(3), rows)
     chain: list[Detection | None] = [None] * len(sightings)
-    for row in best_path(seen, away=True)[0]:
+    for row in best_path(seen, away=True).rows:
         chain[flat[row][0]] = flat[row][1]
     return chain
 

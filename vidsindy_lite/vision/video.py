@@ -339,7 +339,10 @@ def _encode(
         with av.open(str(partial.absolute()), "w") as container:
             for frame in _checked(frames):
                 stream = stream or _add_stream(container, codec, rate, frame.shape[1::-1])
-                container.mux(stream.encode(_shown(frame, codec)))
+                # In the format of the codec, if that costs no more.
+                plain = codec.pixels == "rgb24"
+                colours = (frame, "rgb24") if plain else (_turned(frame), "bgr24")
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(*colours)))
                 count += 1
             if stream is None:
                 raise ValueError("frames: at least one frame is needed, got none")
@@ -350,15 +353,6 @@ def _encode(
         held = len(_packets(*opened))
     if held != count:
         raise OSError(f"path: cannot write {count} frames to '{path}', only {held} are in the file")
-
-
-def _shown(frame: Image, codec: _Codec) -> VideoFrame:
-    """A frame as ffmpeg takes it, and in the format of the codec if that costs no more."""
-    from av import VideoFrame
-
-    if codec.pixels == "rgb24":
-        return VideoFrame.from_ndarray(frame, "rgb24")
-    return VideoFrame.from_ndarray(_turned(frame), "bgr24")
 
 
 def _checked(frames: Iterable[Image]) -> Iterator[Image]:
