@@ -52,14 +52,6 @@ def test_a_coordinate_that_lost_its_law_is_told(duffing):
     assert warning.endswith("use cleaner samples or a longer trajectory")
 
 
-def test_a_law_in_the_data_that_is_not_the_native_one_is_told(duffing):
-    *fitted, law = duffing[2]
-    assert diagnose(*fitted, law) == ()
-    other = replace(law, coefficients=law.coefficients * [1.0, 1.5])
-    (warning,) = diagnose(*fitted, other)
-    assert "the law in the frame of the data is not that in its own frame" in warning
-
-
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("rows", [[300], [0, 1, 2], [597, 598, 599]])
 def test_samples_far_off_are_named(duffing, rows, sign):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vidsindy_lite.dynamics import Library, PolynomialSystem, discover
+from vidsindy_lite.dynamics import PolynomialSystem, discover
 from vidsindy_lite.dynamics.diagnostics import cancelling, shapes, tied
 from vidsindy_lite.study import SYSTEMS
 
@@ -100,19 +100,6 @@ def test_an_orbit_that_shrinks_or_is_rich_is_not_too_plain():
     cycle = solved(lambda _, s: [s[1], -s[0] + 1.5 * (1 - s[0] ** 2) * s[1]], [1, 0], 5 * TIMES)
     assert told(cycle[300:], t=TIMES[300:] * 5, terms=3) == ""
     assert "closed orbit" in told(cycle[300:], t=TIMES[300:] * 5, terms=30)
-
-
-@pytest.mark.parametrize(("amplitude", "doubted"), [(0.8, True), (3.0, False)])
-def test_a_line_and_a_sine_may_be_a_cubic(amplitude, doubted):
-    library = Library.polynomial(1) + Library.fourier(1)
-    law = PolynomialSystem.from_terms(
-        {"x": {"vx": 1}, "vx": {"x": -9.5, "sin(x)": 9.4}}, library=library
-    )
-    x = solved(lambda _, s: law(s), [amplitude, 0])
-    (warning,) = list(cancelling(law, x)) or ("",)
-    assert ("cannot be told apart" in warning) == doubted
-    plain = PolynomialSystem.from_terms({"x": {"vx": 1}, "vx": {"sin(x)": -9.4}}, library=library)
-    assert list(cancelling(plain, x)) == []
 
 
 def test_a_spring_that_is_alike_in_all_directions_is_not_told_from_a_flow():

@@ -251,38 +251,22 @@ def _series(t: Floats, x: Floats, period: float, harmonics: int) -> tuple[Comple
 def cancelling(law: PolynomialSystem, x: Floats, most: float = 300.0) -> Iterator[str]:
     """The equations of a law whose terms cancel along a motion, seen from its middle.
 
-    Their sizes added are so many times their sum. Of a law that is no polynomial, and has no other
-    frame, those of a line and a sine, which x and x^3 imitate: neither is simpler.
+    Their sizes added are so many times their sum. Only a polynomial can be seen from there.
     """
-    if law.is_polynomial:
-        middle = x.mean(axis=0)
-        central, centred = law.shift(-middle), x - middle
-        sums, values = central(centred), monomials(centred, central.exponents)
-        for j, name in enumerate(law.names):
-            parts = np.abs(central.coefficients[:, j] * values).sum(axis=1)
-            times = float(np.sqrt((parts**2).mean() / max((sums[:, j] ** 2).mean(), LEAST)))
-            if times > most:
-                yield (
-                    f"the terms of d{name}/dt cancel (their sizes add up to {times:.1g} times "
-                    "their sum): something is constant on these data; look for it, or add runs "
-                    "from other starts"
-                )
+    if not law.is_polynomial:
         return
-    slopes = law(x)
-    for i, name in enumerate(law.names):
-        if f"sin({name})" not in law.terms or name not in law.terms:
-            continue
-        sine = law.terms.index(f"sin({name})")
-        value, odd = law.library(x)[:, sine], np.stack([x[:, i], x[:, i] ** 3], axis=1)
-        left = value - odd @ np.linalg.lstsq(odd, value, rcond=None)[0]
-        for j in np.flatnonzero(law.support[law.terms.index(name)] & law.support[sine]).tolist():
-            part = law.coefficients[sine, j] * left
-            if (part**2).mean() < 0.02**2 * (slopes[:, j] ** 2).mean():
-                yield (
-                    f"{name} and sin({name}) in d{law.names[j]}/dt are nearly {name} and "
-                    f"{name}^3 on these data: the two cannot be told apart; add runs of a "
-                    "larger amplitude"
-                )
+    middle = x.mean(axis=0)
+    central, centred = law.shift(-middle), x - middle
+    sums, values = central(centred), monomials(centred, central.exponents)
+    for j, name in enumerate(law.names):
+        parts = np.abs(central.coefficients[:, j] * values).sum(axis=1)
+        times = float(np.sqrt((parts**2).mean() / max((sums[:, j] ** 2).mean(), LEAST)))
+        if times > most:
+            yield (
+                f"the terms of d{name}/dt cancel (their sizes add up to {times:.1g} times "
+                "their sum): something is constant on these data; look for it, or add runs "
+                "from other starts"
+            )
 
 
 def tied(names: Sequence[str], x: Floats) -> Iterator[str]:
@@ -620,7 +604,7 @@ def diagnose(
         *outliers(problem.measured, _met(problem, fit)),
         *_shape(problem, fit),
         *_misfit(problem, fit, wider),
-        *_unmet(problem, fit, law, remedy),
+        *_unmet(fit, remedy),
         *_contested(problem, fit.state, path, remedy),
         *_rivals(problem, fit, model, wider, path, law, remedy, clean),
         *_sampling(problem, law, remedy),
@@ -729,11 +713,8 @@ def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:
         )
 
 
-def _unmet(problem: Problem, fit: Fit, law: PolynomialSystem, remedy: str) -> Iterator[str]:
-    """Is the fit no minimum, or have the law's two frames two laws?
-
-    The last may be apart by a fifth of the speed: terms that cannot be told from zero make less.
-    """
+def _unmet(fit: Fit, remedy: str) -> Iterator[str]:
+    """Is the fit no minimum?"""
     if fit.status is not Status.CONVERGED:
         meaning = {
             Status.MAX_STEPS: "its coefficients may be off by more than their errors",
@@ -742,15 +723,6 @@ def _unmet(problem: Problem, fit: Fit, law: PolynomialSystem, remedy: str) -> It
         yield (
             f"the last fit did not converge ({fit.status.value}): {meaning}; use {remedy}, or a "
             "lower degree"
-        )
-    units, (x, _) = problem.units, fit.collocation.node_states(fit.state.control_points)
-    native = problem.law(fit.state)(x - fit.state.offset)
-    slopes = law(units.point(x)) * units.time / units.scale
-    apart = float(np.sqrt(((slopes - native) ** 2).mean()))
-    if not apart < 0.2:
-        yield (
-            f"the law in the frame of the data is not that in its own frame (apart by {apart:.2g} "
-            "of the speed): terms that belong together were told apart; use the native law"
         )
 
 
