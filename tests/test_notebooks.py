@@ -166,8 +166,9 @@ def number_problems(path, figures, references=REFERENCES):
     if not figures.exists():
         return []
     records = read_records(figures) | read_records(references)
-    found = differences(references, figures, path.stem)
-    return [f"{name}: {place}" for name, place in found.items() if "rows" in records[name]]
+    tables = {n for n, r in records.items() if "rows" in r and r["notebook"] == path.stem}
+    found = differences(references, figures)
+    return [f"{name}: {place}" for name, place in found.items() if name in tables]
 
 
 def folder_problems(folder):

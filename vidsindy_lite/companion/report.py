@@ -81,8 +81,8 @@ def page(template: str, **values: object) -> str:
     return _PAGES.get_template(template).render(values)
 
 
-def check_page(name: str, path: str | os.PathLike, template: str) -> Path:
-    """That a page may be written there: nothing is, or an earlier one of this template.
+def write_page(name: str, path: str | os.PathLike, template: str, **values: object) -> Path:
+    """Write a page where nothing is, or an earlier one of this template.
 
     Raises
     ------
@@ -93,6 +93,7 @@ def check_page(name: str, path: str | os.PathLike, template: str) -> Path:
     mark = f'<meta name="generator" content="vidsindy_lite {kind}">'
     if path.exists() and not _holds(path, mark):
         raise ValueError(f"{name}: must be a new file or an earlier page of {kind}, got '{path}'")
+    write_file(path, page(template, **values).encode())
     return path
 
 
@@ -159,7 +160,7 @@ def write_report(
         If there is not one video per camera, or the folder holds files of these names that are none
         of a report.
     """
-    folder = check_folder_is_free(folder).absolute()
+    folder = check_folder_is_free(folder)
     if paths is not None and len(paths) != len(found.rig.cameras):
         raise ValueError(f"paths: must be {len(found.rig.cameras)} videos, got {len(paths)}")
     content = summary(found, paths, options)
@@ -194,14 +195,14 @@ def write_refusal(
     Path
         Of the page.
     """
-    folder = check_folder_is_free(folder).absolute()
+    folder = check_folder_is_free(folder)
     seen = [np.isfinite(track).all(axis=1) for track in refused.tracks]
-    content: dict[str, object] = {
+    told = {
         "format": FORMAT, "status": "refused", "step": refused.step, "error": str(refused),
-        "videos": _names(paths, len(seen)), "options": dict(options or {}),
-        "tracks": [as_json(track, "tracks") for track in refused.tracks],
-        "share_of_frames_seen": [float(one.mean()) for one in seen],
+        "videos": _names(paths, len(seen)), "options": options or {}, "tracks": refused.tracks,
+        "share_of_frames_seen": [one.mean() for one in seen],
     }  # fmt: skip
+    content = as_json(told, "refused")
     # In the middle of what is seen of the target in each view.
     shown = [int(np.flatnonzero(one)[one.sum() // 2]) if one.any() else 0 for one in seen]
     sizes = [camera.image_size for camera in rig.cameras] if rig else [(1, 1)] * len(seen)
@@ -219,7 +220,6 @@ def _put(folder: Path, texts: Mapping[str, str]) -> Path:
     check_folder_is_free(folder)  # again: a while has passed
     is_new = not folder.exists()
     try:
-        folder.mkdir(exist_ok=True)
         write_files({folder / name: text.encode() for name, text in texts.items()})
     finally:
         if is_new:  # and still empty
@@ -282,7 +282,7 @@ def summary(found: VideoDiscovery, paths: Videos, options: Options = None) -> di
     content = {
         "format": FORMAT,
         "status": found.status,
-        "warnings": list(found.warnings),
+        "warnings": found.warnings,
         "law": {
             "data": _law(law, "data"),
             "native": _law(law, "native"),
@@ -293,14 +293,14 @@ def summary(found: VideoDiscovery, paths: Videos, options: Options = None) -> di
         "period": found.period and _parts(found.period, "value", "error"),
         "noise": law.noise,
         "cameras": cameras,
-        "options": dict(options or {}),
+        "options": options or {},
         "t": found.t,
         "x": found.x,
         "curve": np.hstack([part @ turn for part in states]),
-        "tracks": list(found.tracks),
+        "tracks": found.tracks,
         "residuals": missed,
     }
-    return {key: as_json(value, f"found[{key!r}]") for key, value in content.items()}
+    return as_json(content, "found")
 
 
 def _law(found: Discovery, frame: str) -> dict[str, object]:
@@ -458,8 +458,7 @@ def _view(found: VideoDiscovery, path: Path, i: int, instants: range) -> Iterato
 
 def _drawn(image: Image, trail: Floats, spread: float) -> Image:
     """A frame with the last part of the curve, the tube around it, and a ring at its end."""
-    shown = trail[np.isfinite(trail).all(axis=1)]
-    shown = shown[(np.abs(shown) < 10 * _HEIGHT).all(axis=1)]
+    shown = trail[(np.abs(trail) < 10 * _HEIGHT).all(axis=1)]  # and no NaN
     if not len(shown):
         return image
     line = [np.rint(shown).astype(np.int32)[:, None]]
@@ -494,10 +493,7 @@ def write_pick_page(paths: Sequence[str | os.PathLike], out: str | os.PathLike) 
     FileNotFoundError, ValueError
         If a video is missing or none, or another file is at `out`.
     """
-    out = check_page("out", out, "pick.html")
-    text = page("pick.html", videos=[_video(Path(path)) for path in paths])
-    write_file(out, text.encode())
-    return out
+    return write_page("out", out, "pick.html", videos=(_video(Path(path)) for path in paths))
 
 
 def _video(path: Path) -> dict[str, object]:

@@ -2,7 +2,7 @@
 
 The .py half of a pair is the source. A run leaves what it makes in build/runs/ of its output, and
 is not repeated there while the code cells, the package and the libraries are the same. From there
-`compare.refresh` puts into figures/, and this module into ``notebooks/``, what differs from
+`compare.replace` puts into figures/, and this module into ``notebooks/``, what differs from
 what is there already.
 """
 
