@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
+from string import ascii_lowercase
 from typing import TypeAlias, cast
 
 import av
@@ -29,7 +30,6 @@ import jinja2
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.font_manager import findfont, get_font
 
 from ..arrays import Floats, Image
 from ..cameras import DISAGREEMENT, Rig, stacked
@@ -42,8 +42,6 @@ from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
 from ..values import as_json
 from ..vision import VideoInfo, pick_frames, read_frame, video_info
 
-LETTERS = "abcdefgh"  # of several targets, in the heads of tracks
-LONGEST_NAME = 30  # characters above a picture
 PAGE, DATA, RIG, TRACKS = FILES = ("report.html", "result.json", "rig.toml", "tracks.csv")
 FORMAT = 1  # of result.json: counts up when what is in it changes its meaning
 
@@ -234,7 +232,7 @@ def _data(
     content: Mapping[str, object], instants: Floats, tracks: Sequence[Floats], instant: str = "t"
 ) -> dict[str, str]:
     """The data as JSON, and the tracks as a table that `discover --tracks` reads."""
-    several = [""] if tracks[0].shape[1] == 2 else LETTERS[: tracks[0].shape[1] // 2]
+    several = [""] if tracks[0].shape[1] == 2 else ascii_lowercase[: tracks[0].shape[1] // 2]
     columns = [f"{axis}{i + 1}{n}" for i in range(len(tracks)) for n in several for axis in "uv"]
     longest = len(instants)
     whole = [np.pad(t, ((0, longest - len(t)), (0, 0)), constant_values=np.nan) for t in tracks]
@@ -370,22 +368,12 @@ def _look(
     index: int | Sequence[int],
 ) -> Figure:
     """A frame of each view, white where there is no video, with its whole track over it."""
-    names = enumerate(_names(paths, len(tracks)))
-    titles = [f"{_short(name, i)}, frame {frames[i]}" for i, name in names]
+    titles = [f"camera {i + 1}, frame {k}" for i, k in enumerate(frames)]
     images = [
         np.full((height, width, 3), 255, np.uint8) if paths is None else read_frame(paths[i], k)
         for i, ((width, height), k) in enumerate(zip(sizes, frames, strict=True))
     ]
     return plot_frames(images, titles, tracks, index)
-
-
-def _short(name: str, i: int) -> str:
-    """A video's name as it fits above its picture, where a dollar sign would begin a formula."""
-    glyphs = get_font(findfont("sans")).get_charmap()
-    if any(ord(letter) not in glyphs for letter in name):
-        return f"video {i + 1}"
-    fitting = name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
-    return fitting.replace("$", r"\$")
 
 
 def _picture(plot: Callable[..., Figure], *shown: object) -> bytes:

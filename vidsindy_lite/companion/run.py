@@ -162,7 +162,7 @@ def run(
                     print(outcome, flush=True)
                 bar.update()
     finally:
-        for process in _RUNNING:
+        for process in tuple(_RUNNING):  # which changes as they end
             process.terminate()
     write_index(figures)
     return sorted(outcomes, key=lambda outcome: outcome.notebook)
