@@ -626,7 +626,7 @@ def discover_from_tracks(
     *,
     fps: float | None = None,
     individual: str | None = None,
-    lags: Sequence[float] | None = None,
+    lags: Sequence[float] | str | None = None,
     degree: int | None = None,
     library: Library | None = None,
     order: int | str = "auto",
@@ -740,20 +740,19 @@ def _times(
         raise ValueError(f"fps: must not be given with t, got {shown(fps)}")
     if t is not None:
         return t, []
+    stated = [(track.name, track.t) for track in read if track.t is not None]
     if fps is None:
-        for track in read:
-            if track.t is None:
-                raise ValueError(f"t: must be given, or fps, as {track.name} states no times")
-        return [track.t for track in read if track.t is not None], []
-    given, doubts = check_positive("fps", fps), []
-    for track in read:
-        if track.t is not None and len(track.t) > 1:
-            rate = 1 / np.median(np.diff(track.t))
-            if abs(rate / given - 1) > _OTHER_CLOCK:
-                doubts.append(
-                    f"fps: {given:g} frames in a unit of time are taken as given, though "
-                    f"{track.name} states {rate:.4g}"
-                )
+        if len(stated) < len(read):
+            name = next(track.name for track in read if track.t is None)
+            raise ValueError(f"t: must be given, or fps, as {name} states no times")
+        return [times for _, times in stated], []
+    given = check_positive("fps", fps)
+    rates = [(name, 1 / np.median(np.diff(times))) for name, times in stated if len(times) > 1]
+    doubts = [
+        f"fps: {given:g} frames in a unit of time are taken as given, though {name} states "
+        f"{rate:.4g}"
+        for name, rate in rates if abs(rate / given - 1) > _OTHER_CLOCK
+    ]  # fmt: skip
     return [np.arange(len(track.pixels)) / given for track in read], doubts
 
 
