@@ -13,6 +13,7 @@ import json
 import os
 import re
 import tomllib
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
@@ -34,7 +35,6 @@ DEEPEST = 100
 """Levels of a tree: OpenCV's readers of deeper ones overflow their stack."""
 TREES = (".toml", ".json", ".yaml", ".yml", ".xml")
 """Suffixes of files that hold a tree."""
-_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 _HEAD = 4096  # characters that tell text from what is none
 
 
@@ -85,7 +85,7 @@ def read_text(name: str, path: Path, kind: str, fallback: str | None = None) -> 
             f"{name}: must be {kind} of at most {LARGEST_TEXT} bytes, got {size} in '{path}'"
         )
     raw = path.read_bytes()
-    encoding = next((known for mark, known in _MARKS.items() if raw.startswith(mark)), "utf-8")
+    encoding = "utf-16" if raw.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8-sig"
     try:
         text = raw.decode(encoding)
     except UnicodeDecodeError:

@@ -24,7 +24,6 @@ from pathlib import Path
 from string import ascii_lowercase
 from typing import TypeAlias, cast
 
-import av
 import cv2
 import jinja2
 import matplotlib.pyplot as plt
@@ -40,7 +39,7 @@ from ..progress import bar
 from ..storage import write_file, write_files
 from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
 from ..values import as_json
-from ..vision import VideoInfo, pick_frames, read_frame, video_info
+from ..vision import VideoInfo, pick_frames, read_frame, video_info, write_video
 
 PAGE, DATA, RIG, TRACKS = FILES = ("report.html", "result.json", "rig.toml", "tracks.csv")
 FORMAT = 1  # of result.json: counts up when what is in it changes its meaning
@@ -158,14 +157,12 @@ def write_report(
         If there is not one video per camera, or the folder holds files of these names that are none
         of a report.
     """
-    folder = check_folder_is_free(folder)
     if paths is not None and len(paths) != len(found.rig.cameras):
         raise ValueError(f"paths: must be {len(found.rig.cameras)} videos, got {len(paths)}")
     content = summary(found, paths, options)
     files = _data(content, found.t, found.tracks)
     files |= {RIG: found.rig.text()} if len(found.rig.cameras) > 1 else {}
-    total = 2 + (paths is not None) + 2 * (len(found.rig.cameras) > 1)
-    figures = bar(None, "report", iterable=_figures(found, paths), total=total)
+    figures = bar(None, "report", iterable=_figures(found, paths))
     film = None if paths is None else law_over_videos(found, paths)
     drawn = {"figures": figures, "film": film, "limit": DISAGREEMENT}
     return _put(folder, {PAGE: page("report.html", found=found, **drawn, **content)} | files)
@@ -193,7 +190,6 @@ def write_refusal(
     Path
         Of the page.
     """
-    folder = check_folder_is_free(folder)
     seen = [np.isfinite(track).all(axis=1) for track in refused.tracks]
     told = {
         "format": FORMAT, "status": "refused", "step": refused.step, "error": str(refused),
@@ -210,12 +206,12 @@ def write_refusal(
     return _put(folder, {PAGE: page("refusal.html", look=look, **content)} | files)
 
 
-def _put(folder: Path, texts: Mapping[str, str]) -> Path:
+def _put(folder: str | Path, texts: Mapping[str, str]) -> Path:
     """Put the files of a report into its folder, and take away those of an earlier one.
 
     The page is the first, which tells whose the others are.
     """
-    check_folder_is_free(folder)  # again: a while has passed
+    folder = check_folder_is_free(folder)
     is_new = not folder.exists()
     try:
         write_files({folder / name: text.encode() for name, text in texts.items()})
@@ -409,18 +405,9 @@ def law_over_videos(found: VideoDiscovery, paths: Sequence[str | Path]) -> bytes
     """
     instants = range(0, len(found.t), -(-len(found.t) // _INSTANTS))
     views = [_view(found, Path(path), i, instants) for i, path in enumerate(paths)]
-    file = io.BytesIO()
-    with av.open(file, "w", format="webm") as container:
-        options = {"deadline": "realtime", "cpu-used": "8", "crf": "36", "b": "0"}
-        stream = container.add_stream("libvpx-vp9", _RATE, options=options)
-        for k, images in enumerate(zip(*views, strict=True)):
-            side_by_side = np.hstack(images)
-            if k == 0:
-                stream.width, stream.height = side_by_side.shape[1::-1]
-                stream.pix_fmt = "yuv420p"
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(side_by_side, "rgb24")))
-        container.mux(stream.encode(None))
-    return file.getvalue()
+    frames = (np.hstack(images) for images in zip(*views, strict=True))
+    with tempfile.TemporaryDirectory() as own:
+        return write_video(Path(own) / "law.webm", frames, _RATE, "VP9").read_bytes()
 
 
 def _view(found: VideoDiscovery, path: Path, i: int, instants: range) -> Iterator[Image]:
