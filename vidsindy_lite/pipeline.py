@@ -275,24 +275,21 @@ def _observed(
                 return affine
             doubts = (*rig.warnings, *doubts)
     first: list[str] = []
-    start = lags
-    if not synchronous:
-        mistake = cameras.find_mistake(films, rig, names)
+    if synchronous:
+        best = Lags(films.lags, films.rates, films.lags, 0.0, clocks=films.uneven)
+    else:
+        start, mistake = lags, cameras.find_mistake(films, rig, names)
         if mistake is not None:  # and is put right, as nothing can be learned with it
             first, films = [mistake.text], mistake.footage
             raw, clock = films.tracks, clock.mended(films)
             lags, start = None, mistake.lags.frames
-    with refusing("lags", raw, names):
-        if synchronous:
-            best = Lags(films.lags, films.rates, films.lags, 0.0, clocks=films.uneven)
-        else:
-            rates, frames = clock.rates, clock.frames
-            best = cameras.learn_lags(raw, rig, rates, start, frames, progress=progress)
-        if lags is not None and _apart(lags, best, _WRONG_LAG):
-            raise ValueError(
-                f"lags: must make the views agree, got ({cameras.list_lags(lags)}) frames where "
-                f"({cameras.list_lags(best.frames)}) do: leave them out, or check them"
-            )
+        with refusing("lags", raw, names):
+            best = cameras.learn_lags(raw, rig, clock.rates, start, clock.frames, progress=progress)
+            if lags is not None and _apart(lags, best, _WRONG_LAG):
+                raise ValueError(
+                    f"lags: must make the views agree, got ({cameras.list_lags(lags)}) frames "
+                    f"where ({cameras.list_lags(best.frames)}) do: leave them out, or check them"
+                )
     told = best if lags is None else replace(best, frames=lags, errors=0 * lags, warnings=())
     tracks = replace(films, lags=told.frames, rates=best.rates).aligned
     with refusing("cameras", raw, names):
