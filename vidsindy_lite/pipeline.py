@@ -152,11 +152,13 @@ def observe(
         cameras.check_learnable(rig)
     vision.check_detector(detector)
     check_integer("targets", targets, least=1)
-    if targets > 1:
-        _check_several(targets, rig, detector, hints)
     count = None if rig is None else len(rig.cameras)
     each = enumerate(check_items("paths", paths, count, "camera of the rig"))
     files = [check_path(f"paths[{i}]", path) for i, path in each]
+    given = [None] * len(files) if hints is None else hints
+    hints = check_items("hints", given, len(files), "video")
+    if targets > 1:
+        _check_several(targets, rig, detector, hints)
     shots = [vision.video_info(path) for path in files]
     if rig is None:
         rig = Rig(tuple(cameras.PerspectiveCamera(image_size=shot.size) for shot in shots))
@@ -172,12 +174,10 @@ def observe(
     clocks = [vision.frame_clock(path) for path in files]
     clock = Clock.of_videos([shot.fps for shot in shots], clocks, t)
     starts = _check_lags(lags, clock, names)
-    films = bar(progress, "track", iterable=list(zip(files, shots, strict=True)))
-    hints = [None] * len(files) if hints is None else hints
-    asked = check_items("hints", hints, len(files), "video")
+    films = list(zip(files, shots, hints, strict=True))
     seen = [
         tracked(path, shot.frames, detector, hint, targets)
-        for (path, shot), hint in zip(films, asked, strict=True)
+        for path, shot, hint in bar(progress, "track", iterable=films)
     ]
     tracks = [np.hstack([track.pixels for track in found]) for found in seen]
     check_found(tracks, names, targets)
@@ -382,7 +382,7 @@ def _check_lags(lags: Sequence[float] | None, clock: Clock, names: Sequence[str]
 
 
 def _check_several(
-    targets: int, rig: Rig | None, detector: str | os.PathLike, hints: Sequence[Hint | None] | None
+    targets: int, rig: Rig | None, detector: str | os.PathLike, hints: Sequence[Hint | None]
 ) -> None:
     """That several targets can be told apart."""
     known = len(rig.cameras) if rig is not None and rig.is_measured else 0
@@ -391,7 +391,7 @@ def _check_several(
             f"targets: {targets} need three cameras of known places and directions, got {known} "
             "of known ones"
         )
-    if detector != "auto" or any(hints or ()):
+    if detector != "auto" or any(hints):
         raise ValueError(
             f"targets: {targets} are found by detector='auto' alone, without hints, got "
             f"detector={shown(detector)}, hints={shown(hints)}"
