@@ -832,7 +832,7 @@ def _likely_causes(step: str, tracks: Sequence[Floats], names: Sequence[str]) ->
     tracker = "the tracker" + (f" (look at {', '.join(strange)})" if strange else "")
     if len(tracks) == 1:
         return tracker
-    if strange or step == "track":
+    if strange:
         return f"{tracker}, the lags, the rig"
     return f"the lags, the rig, {tracker}" if step == "lags" else f"the rig, the lags, {tracker}"
 
