@@ -165,9 +165,10 @@ def number_problems(path, figures, references=REFERENCES):
     """Where the tables of a quick run hold other numbers than the committed ones."""
     if not figures.exists():
         return []
-    records = read_records(figures) | read_records(references)
-    found = differences(references, figures, path.stem)
-    return [f"{name}: {place}" for name, place in found.items() if "rows" in records[name]]
+    records = [*read_records(figures).items(), *read_records(references).items()]
+    tables = {name for name, r in records if "rows" in r and r["notebook"] == path.stem}
+    found = differences(references, figures)
+    return [f"{name}: {place}" for name, place in found.items() if name in tables]
 
 
 def folder_problems(folder):

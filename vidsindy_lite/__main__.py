@@ -125,7 +125,7 @@ def _discover(options: argparse.Namespace) -> int:
     2 if there is no law; the error says why.
     """
     from .cameras import Rig, list_lags
-    from .companion.report import PAGE, check_folder_is_free, write_refusal, write_report
+    from .companion.report import check_folder_is_free, write_refusal, write_report
     from .dynamics import Library, check_library
     from .pipeline import Refused, Stopped
 
@@ -159,18 +159,16 @@ def _discover(options: argparse.Namespace) -> int:
         if isinstance(refused, Stopped) and not videos:  # its tracks are there already
             raise KeyboardInterrupt from None
         try:
-            write_refusal(refused, videos, rig, options.out, told)
+            page = write_refusal(refused, videos, rig, options.out, told)
         except (ValueError, OSError) as error:
             raise ValueError(f"{refused}; the tracks could not be drawn: {error}") from None
-        page = Path(options.out) / PAGE
         if isinstance(refused, Stopped):
             raise KeyboardInterrupt(f"the tracks are kept beside {page}") from None
         raise ValueError(f"{refused}; the tracks are drawn in {page}") from None
     # First the law: if the report cannot be written, it is not lost.
     lags = "" if alone else f"; lags of the videos: {list_lags(found.lags.frames)} frames"
     print(f"{found}\nstatus: {found.status}{lags}", flush=True)
-    write_report(found, videos, options.out, told)
-    print(f"report: {Path(options.out) / PAGE}")
+    print(f"report: {write_report(found, videos, options.out, told)}")
     return 0 if found.status == "ok" else 1
 
 

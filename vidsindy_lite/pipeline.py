@@ -152,11 +152,13 @@ def observe(
         cameras.check_learnable(rig)
     vision.check_detector(detector)
     check_integer("targets", targets, least=1)
-    if targets > 1:
-        _check_several(targets, rig, detector, hints)
     count = None if rig is None else len(rig.cameras)
     each = enumerate(check_items("paths", paths, count, "camera of the rig"))
     files = [check_path(f"paths[{i}]", path) for i, path in each]
+    given = [None] * len(files) if hints is None else hints
+    hints = check_items("hints", given, len(files), "video")
+    if targets > 1:
+        _check_several(targets, rig, detector, hints)
     shots = [vision.video_info(path) for path in files]
     if rig is None:
         rig = Rig(tuple(cameras.PerspectiveCamera(image_size=shot.size) for shot in shots))
@@ -172,12 +174,10 @@ def observe(
     clocks = [vision.frame_clock(path) for path in files]
     clock = Clock.of_videos([shot.fps for shot in shots], clocks, t)
     starts = _check_lags(lags, clock, names)
-    films = bar(progress, "track", iterable=list(zip(files, shots, strict=True)))
-    hints = [None] * len(files) if hints is None else hints
-    asked = check_items("hints", hints, len(files), "video")
+    films = list(zip(files, shots, hints, strict=True))
     seen = [
         tracked(path, shot.frames, detector, hint, targets)
-        for (path, shot), hint in zip(films, asked, strict=True)
+        for path, shot, hint in bar(progress, "track", iterable=films)
     ]
     tracks = [np.hstack([track.pixels for track in found]) for found in seen]
     check_found(tracks, names, targets)
@@ -275,24 +275,21 @@ def _observed(
                 return affine
             doubts = (*rig.warnings, *doubts)
     first: list[str] = []
-    start = lags
-    if not synchronous:
-        mistake = cameras.find_mistake(films, rig, names)
+    if synchronous:
+        best = Lags(films.lags, films.rates, films.lags, 0.0, clocks=films.uneven)
+    else:
+        start, mistake = lags, cameras.find_mistake(films, rig, names)
         if mistake is not None:  # and is put right, as nothing can be learned with it
             first, films = [mistake.text], mistake.footage
             raw, clock = films.tracks, clock.mended(films)
             lags, start = None, mistake.lags.frames
-    with refusing("lags", raw, names):
-        if synchronous:
-            best = Lags(films.lags, films.rates, films.lags, 0.0, clocks=films.uneven)
-        else:
-            rates, frames = clock.rates, clock.frames
-            best = cameras.learn_lags(raw, rig, rates, start, frames, progress=progress)
-        if lags is not None and _apart(lags, best, _WRONG_LAG):
-            raise ValueError(
-                f"lags: must make the views agree, got ({cameras.list_lags(lags)}) frames where "
-                f"({cameras.list_lags(best.frames)}) do: leave them out, or check them"
-            )
+        with refusing("lags", raw, names):
+            best = cameras.learn_lags(raw, rig, clock.rates, start, clock.frames, progress=progress)
+            if lags is not None and _apart(lags, best, _WRONG_LAG):
+                raise ValueError(
+                    f"lags: must make the views agree, got ({cameras.list_lags(lags)}) frames "
+                    f"where ({cameras.list_lags(best.frames)}) do: leave them out, or check them"
+                )
     told = best if lags is None else replace(best, frames=lags, errors=0 * lags, warnings=())
     tracks = replace(films, lags=told.frames, rates=best.rates).aligned
     with refusing("cameras", raw, names):
@@ -385,7 +382,7 @@ def _check_lags(lags: Sequence[float] | None, clock: Clock, names: Sequence[str]
 
 
 def _check_several(
-    targets: int, rig: Rig | None, detector: str | os.PathLike, hints: Sequence[Hint | None] | None
+    targets: int, rig: Rig | None, detector: str | os.PathLike, hints: Sequence[Hint | None]
 ) -> None:
     """That several targets can be told apart."""
     known = len(rig.cameras) if rig is not None and rig.is_measured else 0
@@ -394,7 +391,7 @@ def _check_several(
             f"targets: {targets} need three cameras of known places and directions, got {known} "
             "of known ones"
         )
-    if detector != "auto" or any(hints or ()):
+    if detector != "auto" or any(hints):
         raise ValueError(
             f"targets: {targets} are found by detector='auto' alone, without hints, got "
             f"detector={shown(detector)}, hints={shown(hints)}"
@@ -626,7 +623,7 @@ def discover_from_tracks(
     *,
     fps: float | None = None,
     individual: str | None = None,
-    lags: Sequence[float] | None = None,
+    lags: Sequence[float] | str | None = None,
     degree: int | None = None,
     library: Library | None = None,
     order: int | str = "auto",
@@ -740,20 +737,19 @@ def _times(
         raise ValueError(f"fps: must not be given with t, got {shown(fps)}")
     if t is not None:
         return t, []
+    stated = [(track.name, track.t) for track in read if track.t is not None]
     if fps is None:
-        for track in read:
-            if track.t is None:
-                raise ValueError(f"t: must be given, or fps, as {track.name} states no times")
-        return [track.t for track in read if track.t is not None], []
-    given, doubts = check_positive("fps", fps), []
-    for track in read:
-        if track.t is not None and len(track.t) > 1:
-            rate = 1 / np.median(np.diff(track.t))
-            if abs(rate / given - 1) > _OTHER_CLOCK:
-                doubts.append(
-                    f"fps: {given:g} frames in a unit of time are taken as given, though "
-                    f"{track.name} states {rate:.4g}"
-                )
+        if len(stated) < len(read):
+            name = next(track.name for track in read if track.t is None)
+            raise ValueError(f"t: must be given, or fps, as {name} states no times")
+        return [times for _, times in stated], []
+    given = check_positive("fps", fps)
+    rates = [(name, 1 / np.median(np.diff(times))) for name, times in stated if len(times) > 1]
+    doubts = [
+        f"fps: {given:g} frames in a unit of time are taken as given, though {name} states "
+        f"{rate:.4g}"
+        for name, rate in rates if abs(rate / given - 1) > _OTHER_CLOCK
+    ]  # fmt: skip
     return [np.arange(len(track.pixels)) / given for track in read], doubts
 
 
@@ -836,7 +832,7 @@ def _likely_causes(step: str, tracks: Sequence[Floats], names: Sequence[str]) ->
     tracker = "the tracker" + (f" (look at {', '.join(strange)})" if strange else "")
     if len(tracks) == 1:
         return tracker
-    if strange or step == "track":
+    if strange:
         return f"{tracker}, the lags, the rig"
     return f"the lags, the rig, {tracker}" if step == "lags" else f"the rig, the lags, {tracker}"
 

@@ -10,7 +10,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -152,7 +152,7 @@ def discover_from_video(
     >>> print(found, found.g)
     """
     check_detector(detector)
-    law_options(degree, None, order, "learn", "data", seed, progress, 2)
+    asked = law_options(degree, None, order, "learn", "data", seed, progress, 2)
     share = check_number("length_error", length_error)
     if not 0 <= share < 1:
         raise ValueError(f"length_error: must be a share of the length, 0 to 1, got {share}")
@@ -178,7 +178,7 @@ def discover_from_video(
     known = slice(3 if corners is None else 1) if pixels else slice(0)
     modes = np.stack([error * x, *_tilts(camera, seen.pixels, middle)])[known]
     with refusing("law", [seen.pixels], [name]):
-        law, circle = _law(t, x, modes, degree, order, seed, progress)
+        law, circle = _law(t, x, modes, asked)
     doubts = law.warnings if circle is None else (*circle.warnings, *law.warnings)
     found = PlaneDiscovery(
         tracks=(seen.pixels,), rig=rig, lags=Lags(np.zeros(1), np.ones(1), np.zeros(1), 0.0),
@@ -286,9 +286,8 @@ def _tilts(camera: PlaneCamera, pixels: Floats, middle: Floats) -> list[Floats]:
 
 
 def _law(
-    t: Floats, x: Floats, modes: Floats, degree: int | None, order: int | str, seed: int,
-    progress: bool | None,
-) -> tuple[Discovery, Round | None]:  # fmt: skip
+    t: Floats, x: Floats, modes: Floats, asked: dict[str, Any]
+) -> tuple[Discovery, Round | None]:
     """The law of places: of nested ones the simplest that the data bear, or the one asked for.
 
     Or that of an angle, and the circle on which it is.
@@ -297,12 +296,12 @@ def _law(
     other without its modes, which are in the error bars of what flies and of what swings round.
     """
     there, axes = np.isfinite(x[:, 0]), np.eye(2)
-    if degree is None and order == "auto":
+    if asked["degree"] is None and asked["order"] == "auto":
         flight = homogeneous(t[there], x[there], ("x", "y"), modes[:, there])
         if flight is not None:
             return flight, None
-        degree, order, axes = 1, 2, _axes(t[there], x[there])
-    law = discover(t, x @ axes.T, degree, seed, progress, modes[:1] @ axes.T, order)
+        asked, axes = asked | {"degree": 1, "order": 2}, _axes(t[there], x[there])
+    law = discover(t, x @ axes.T, systematic=modes[:1] @ axes.T, **asked)
     if law.swing is not None:
         return law.swing.law, on_circle(x, law.swing.circle.axes[0], modes)
     if len(axes) == 1:

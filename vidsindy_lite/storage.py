@@ -8,12 +8,12 @@ file it was if that is malformed.
 from __future__ import annotations
 
 import ast
-import glob
 import hashlib
 import json
 import os
 import re
 import tomllib
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
@@ -35,7 +35,6 @@ DEEPEST = 100
 """Levels of a tree: OpenCV's readers of deeper ones overflow their stack."""
 TREES = (".toml", ".json", ".yaml", ".yml", ".xml")
 """Suffixes of files that hold a tree."""
-_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 _HEAD = 4096  # characters that tell text from what is none
 
 
@@ -86,7 +85,7 @@ def read_text(name: str, path: Path, kind: str, fallback: str | None = None) -> 
             f"{name}: must be {kind} of at most {LARGEST_TEXT} bytes, got {size} in '{path}'"
         )
     raw = path.read_bytes()
-    encoding = next((known for mark, known in _MARKS.items() if raw.startswith(mark)), "utf-8")
+    encoding = "utf-16" if raw.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8-sig"
     try:
         text = raw.decode(encoding)
     except UnicodeDecodeError:
@@ -192,8 +191,7 @@ def write_file(path: Path, content: bytes) -> None:
 def write_files(contents: Mapping[Path, bytes]) -> None:
     """Replace files when all are written beside them; a link is followed, a device written to.
 
-    A full disk or a killed run leaves the old ones. What a killed run of this machine has left
-    beside them is removed.
+    A full disk or a killed run leaves the old ones.
     """
     beside: dict[Path, Path] = {}
     try:
@@ -203,9 +201,6 @@ def write_files(contents: Mapping[Path, bytes]) -> None:
                 path.write_bytes(content)
                 continue
             path.parent.mkdir(parents=True, exist_ok=True)
-            for left in path.parent.glob(f".{glob.escape(path.name)}.*"):
-                if left.suffix[1:].isdecimal() and not _is_running(int(left.suffix[1:])):
-                    left.unlink(missing_ok=True)
             beside[path] = path.with_name(f".{path.name}.{os.getpid()}")
             beside[path].write_bytes(content)
             if path.exists():
@@ -215,15 +210,6 @@ def write_files(contents: Mapping[Path, bytes]) -> None:
     finally:
         for new in beside.values():
             new.unlink(missing_ok=True)
-
-
-def _is_running(process: int) -> bool:
-    """Whether a process of this number is there; where that cannot be told, it is."""
-    try:
-        os.kill(process, 0) if os.name == "posix" else None
-    except (ProcessLookupError, PermissionError, OverflowError) as error:
-        return not isinstance(error, ProcessLookupError)
-    return True
 
 
 # ----------------------------------------------------------------------------------- the repository

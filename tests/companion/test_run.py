@@ -65,16 +65,19 @@ def executed_once(tmp_path_factory):
     """A repository with one good notebook, after a full run."""
     tiny = TinyRepository(tmp_path_factory.mktemp("executed"))
     tiny.write("01_first", PLOT, FIGURE + TABLE, NOISE)
-    (outcome,) = run(root=tiny.root)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tiny.root)
+        (outcome,) = run()
     assert outcome.error is None
     assert outcome.changed == ("fig_1", "table_1", "01_first.ipynb")
     return tiny
 
 
 @pytest.fixture
-def good(executed_once, tmp_path):
+def good(executed_once, tmp_path, monkeypatch):
     """A copy of it, to change."""
     shutil.copytree(executed_once.root, tmp_path / "repository")
+    monkeypatch.chdir(tmp_path / "repository")
     return TinyRepository(tmp_path / "repository")
 
 
@@ -82,7 +85,7 @@ def good(executed_once, tmp_path):
 def no_kernel(monkeypatch):
     """Notebooks are executed without a kernel: for tests of when they are."""
 
-    def execute(path, parameters, folder, *, environment):
+    def execute(path, parameters, folder):
         notebook = jupytext.read(path)
         for cell in notebook.cells:
             if cell.cell_type == "code":
@@ -131,28 +134,28 @@ def test_what_differs_is_refreshed_and_nothing_else_though_a_disk_was_full(
     for writer in ("compare.write_files", "run.write_file"):
         with monkeypatch.context() as patch:
             patch.setattr(f"vidsindy_lite.companion.{writer}", full_disk)
-            (outcome,) = run(root=good.root)
+            (outcome,) = run()
         assert "No space left on device" in outcome.error
-    (outcome,) = run(root=good.root)
+    (outcome,) = run()
     assert (outcome.seconds, outcome.changed) == (None, ("table_1", "01_first.ipynb"))
     assert outputs(good) == before
     good.write("01_first", PLOT, "x = 1")
-    (outcome,) = run(root=good.root)
+    (outcome,) = run()
     assert set(outcome.changed) == {"fig_1", "table_1", "01_first.ipynb"}
     assert set(files(good.root / "figures")) == {"README.md"}
 
 
 def test_only_other_code_is_executed(good, instant, monkeypatch):
     good.write("02_second", "x = 1")
-    assert executed(run(root=good.root)) == ["01_first", "02_second"]
-    assert executed(run(root=good.root)) == []
-    assert executed(run(["02"], root=good.root, force=True)) == ["02_second"]
+    assert executed(run()) == ["01_first", "02_second"]
+    assert executed(run()) == []
+    assert executed(run(["02"], force=True)) == ["02_second"]
     path = good.notebooks / "02_second.py"
     path.write_text(path.read_text().replace("A tiny notebook", "A small notebook"))
-    assert executed(run(root=good.root)) == []
+    assert executed(run()) == []
     assert "A small notebook" in path.with_suffix(".ipynb").read_text()
     monkeypatch.setattr(runner, "code_hash", cache(lambda: "another"))  # of the package
-    assert executed(run(root=good.root)) == ["01_first", "02_second"]
+    assert executed(run()) == ["01_first", "02_second"]
 
 
 @pytest.mark.slow
@@ -205,19 +208,20 @@ def test_notebooks_that_fail_leave_what_was_there(good, monkeypatch, capsys):
     assert "table_1.json" in {path.name for path in (failed / "figures").iterdir()}
 
 
-def test_a_notebook_that_does_not_end_has_failed(tiny, tmp_path):
+def test_a_notebook_that_does_not_end_has_failed(tiny, tmp_path, monkeypatch):
     path = tiny.write("01_bad", "while True:\n    pass")
     with pytest.raises(ValueError, match="notebook 01_bad has profile .* got colour"):
         execute(path, {"profile": "quick", "colour": "red"}, tmp_path / "run")
+    monkeypatch.setattr(runner, "CELL_TIMEOUT", 1)
     with pytest.raises(NotebookError, match=r"01_bad, cell In (?s:.*)timed out"):
-        execute(path, {"profile": "quick"}, tmp_path / "run", timeout=1)
+        execute(path, {"profile": "quick"}, tmp_path / "run")
 
 
 def test_an_edit_meanwhile_is_not_taken_for_a_run_of_this_code(good, instant, monkeypatch):
     hashes = iter(["before", "after", "before", "before"])
     monkeypatch.setattr(runner, "_key", lambda source: next(hashes))
-    assert executed(run(root=good.root)) == ["01_first"]
-    assert executed(run(root=good.root)) == ["01_first"]
+    assert executed(run()) == ["01_first"]
+    assert executed(run()) == ["01_first"]
 
 
 def start(tiny):
@@ -248,7 +252,7 @@ def test_a_run_that_is_killed_leaves_no_process_and_goes_on_later(good, no_kerne
     long.unlink()
     assert outputs(good) == before
     good.write("02_long", "x = 1")
-    assert executed(run(root=good.root)) == ["02_long"]
+    assert executed(run()) == ["02_long"]
     assert not (good.root / "build" / "runs" / "02_long-full" / "running").exists()
 
 
@@ -267,7 +271,7 @@ def test_names_of_notebooks(tiny):
 
 def test_what_makes_no_sense_is_refused(tiny, tmp_path, monkeypatch, capsys):
     with pytest.raises(ValueError, match="profile: must be one of full, quick, got 'small'"):
-        run(profile="small", root=tiny.root)
+        run(profile="small")
     tiny.write("01_first")
     for name in ("first", "01_f", ""):
         with pytest.raises(ValueError, match=f"notebook: expected one of 01_first, .* '{name}'"):

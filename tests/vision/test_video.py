@@ -189,7 +189,7 @@ def read_by_opencv(path):
 
 ALL = [
     ("a.mov", None), ("a.mkv", None), ("a.avi", "FFV1"), ("a.mp4", "mp4v"), ("a.avi", "MJPG"),
-    ("a.mkv", "MJPG"), ("a.mp4", "H264"),
+    ("a.mkv", "MJPG"), ("a.mp4", "H264"), ("a.webm", "VP9"),
 ]  # fmt: skip
 
 

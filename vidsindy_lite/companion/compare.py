@@ -20,9 +20,9 @@ from PIL import Image, ImageSequence
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from ..checks import check_path
-from ..storage import write_file, write_files
+from ..storage import write_files
 from .artifacts import files_of, read_records
-from .report import check_page, page
+from .report import write_page
 
 TOLERANCE = 1e-3  # of a number, relative, where its record states no other
 OF_LIST = 1e-4  # of the largest of a list: what is nearly zero beside it has fewer digits
@@ -40,9 +40,7 @@ _WITH_ERROR = re.compile(rf" ?(?:±|\+-) ?({_NUMBER.pattern})", re.IGNORECASE)
 _SAVES = re.compile(r"\bsave_(?:figure|slider|animation|table)\(")
 
 
-def differences(
-    committed: str | os.PathLike, regenerated: str | os.PathLike, notebook: str | None = None
-) -> dict[str, str]:
+def differences(committed: str | os.PathLike, regenerated: str | os.PathLike) -> dict[str, str]:
     """Which figures and tables hold other numbers, and where each first differs.
 
     Numbers may differ by the tolerance that the committed record states, for all or for their
@@ -53,8 +51,6 @@ def differences(
     ----------
     committed, regenerated : path
         Folders as notebooks write them.
-    notebook : str, optional
-        Only what it has made.
 
     Returns
     -------
@@ -66,8 +62,7 @@ def differences(
     ValueError
         If one of them is no folder, or holds no figure or table.
     """
-    ours = _records("committed", committed, notebook)
-    theirs = _records("regenerated", regenerated, notebook)
+    ours, theirs = _records("committed", committed), _records("regenerated", regenerated)
     found = {}
     for name in sorted(ours | theirs):
         if name not in ours or name not in theirs:
@@ -99,10 +94,9 @@ def write_differences(
     ValueError
         As of `differences`, or if another file is at `output`.
     """
-    output = check_page("output", output, "compare.html")
     found = differences(committed, regenerated)
     folders = {"committed": Path(committed), "regenerated": Path(regenerated)}
-    write_file(output, page("compare.html", found=found, folders=folders).encode())
+    write_page("output", output, "compare.html", found=found, folders=folders)
     return found
 
 
@@ -247,14 +241,14 @@ def _strange(one: np.ndarray, other: np.ndarray) -> float:
 # ------------------------------------------------------------------------------------------ details
 
 
-def _records(name: str, folder: str | os.PathLike, notebook: str | None) -> dict[str, dict]:
-    """The records of a folder, or those of a notebook in it; one that is damaged is none."""
+def _records(name: str, folder: str | os.PathLike) -> dict[str, dict]:
+    """The records of a folder; one that is damaged is none."""
     folder = check_path(name, folder)
     if not folder.is_dir():
         raise ValueError(f"{name}: must be a folder, got '{folder}'")
     if not (records := read_records(folder)):
         raise ValueError(f"{name}: must hold figures or tables (*.json), got none in '{folder}'")
-    return {n: one for n, one in records.items() if notebook in (None, one["notebook"])}
+    return records
 
 
 def _first_difference(one: dict, other: dict) -> str | None:

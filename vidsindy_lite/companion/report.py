@@ -21,15 +21,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
+from string import ascii_lowercase
 from typing import TypeAlias, cast
 
-import av
 import cv2
 import jinja2
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.font_manager import findfont, get_font
 
 from ..arrays import Floats, Image
 from ..cameras import DISAGREEMENT, Rig, stacked
@@ -40,10 +39,8 @@ from ..progress import bar
 from ..storage import write_file, write_files
 from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
 from ..values import as_json
-from ..vision import VideoInfo, pick_frames, read_frame, video_info
+from ..vision import VideoInfo, pick_frames, read_frame, video_info, write_video
 
-LETTERS = "abcdefgh"  # of several targets, in the heads of tracks
-LONGEST_NAME = 30  # characters above a picture
 PAGE, DATA, RIG, TRACKS = FILES = ("report.html", "result.json", "rig.toml", "tracks.csv")
 FORMAT = 1  # of result.json: counts up when what is in it changes its meaning
 
@@ -81,8 +78,8 @@ def page(template: str, **values: object) -> str:
     return _PAGES.get_template(template).render(values)
 
 
-def check_page(name: str, path: str | os.PathLike, template: str) -> Path:
-    """That a page may be written there: nothing is, or an earlier one of this template.
+def write_page(name: str, path: str | os.PathLike, template: str, **values: object) -> Path:
+    """Write a page where nothing is, or an earlier one of this template.
 
     Raises
     ------
@@ -93,6 +90,7 @@ def check_page(name: str, path: str | os.PathLike, template: str) -> Path:
     mark = f'<meta name="generator" content="vidsindy_lite {kind}">'
     if path.exists() and not _holds(path, mark):
         raise ValueError(f"{name}: must be a new file or an earlier page of {kind}, got '{path}'")
+    write_file(path, page(template, **values).encode())
     return path
 
 
@@ -159,14 +157,12 @@ def write_report(
         If there is not one video per camera, or the folder holds files of these names that are none
         of a report.
     """
-    folder = check_folder_is_free(folder).absolute()
     if paths is not None and len(paths) != len(found.rig.cameras):
         raise ValueError(f"paths: must be {len(found.rig.cameras)} videos, got {len(paths)}")
     content = summary(found, paths, options)
     files = _data(content, found.t, found.tracks)
     files |= {RIG: found.rig.text()} if len(found.rig.cameras) > 1 else {}
-    total = 2 + (paths is not None) + 2 * (len(found.rig.cameras) > 1)
-    figures = bar(None, "report", iterable=_figures(found, paths), total=total)
+    figures = bar(None, "report", iterable=_figures(found, paths))
     film = None if paths is None else law_over_videos(found, paths)
     drawn = {"figures": figures, "film": film, "limit": DISAGREEMENT}
     return _put(folder, {PAGE: page("report.html", found=found, **drawn, **content)} | files)
@@ -194,14 +190,13 @@ def write_refusal(
     Path
         Of the page.
     """
-    folder = check_folder_is_free(folder).absolute()
     seen = [np.isfinite(track).all(axis=1) for track in refused.tracks]
-    content: dict[str, object] = {
+    told = {
         "format": FORMAT, "status": "refused", "step": refused.step, "error": str(refused),
-        "videos": _names(paths, len(seen)), "options": dict(options or {}),
-        "tracks": [as_json(track, "tracks") for track in refused.tracks],
-        "share_of_frames_seen": [float(one.mean()) for one in seen],
+        "videos": _names(paths, len(seen)), "options": options or {}, "tracks": refused.tracks,
+        "share_of_frames_seen": [one.mean() for one in seen],
     }  # fmt: skip
+    content = as_json(told, "refused")
     # In the middle of what is seen of the target in each view.
     shown = [int(np.flatnonzero(one)[one.sum() // 2]) if one.any() else 0 for one in seen]
     sizes = [camera.image_size for camera in rig.cameras] if rig else [(1, 1)] * len(seen)
@@ -211,15 +206,14 @@ def write_refusal(
     return _put(folder, {PAGE: page("refusal.html", look=look, **content)} | files)
 
 
-def _put(folder: Path, texts: Mapping[str, str]) -> Path:
+def _put(folder: str | Path, texts: Mapping[str, str]) -> Path:
     """Put the files of a report into its folder, and take away those of an earlier one.
 
     The page is the first, which tells whose the others are.
     """
-    check_folder_is_free(folder)  # again: a while has passed
+    folder = check_folder_is_free(folder)
     is_new = not folder.exists()
     try:
-        folder.mkdir(exist_ok=True)
         write_files({folder / name: text.encode() for name, text in texts.items()})
     finally:
         if is_new:  # and still empty
@@ -234,7 +228,7 @@ def _data(
     content: Mapping[str, object], instants: Floats, tracks: Sequence[Floats], instant: str = "t"
 ) -> dict[str, str]:
     """The data as JSON, and the tracks as a table that `discover --tracks` reads."""
-    several = [""] if tracks[0].shape[1] == 2 else LETTERS[: tracks[0].shape[1] // 2]
+    several = [""] if tracks[0].shape[1] == 2 else ascii_lowercase[: tracks[0].shape[1] // 2]
     columns = [f"{axis}{i + 1}{n}" for i in range(len(tracks)) for n in several for axis in "uv"]
     longest = len(instants)
     whole = [np.pad(t, ((0, longest - len(t)), (0, 0)), constant_values=np.nan) for t in tracks]
@@ -282,7 +276,7 @@ def summary(found: VideoDiscovery, paths: Videos, options: Options = None) -> di
     content = {
         "format": FORMAT,
         "status": found.status,
-        "warnings": list(found.warnings),
+        "warnings": found.warnings,
         "law": {
             "data": _law(law, "data"),
             "native": _law(law, "native"),
@@ -293,14 +287,14 @@ def summary(found: VideoDiscovery, paths: Videos, options: Options = None) -> di
         "period": found.period and _parts(found.period, "value", "error"),
         "noise": law.noise,
         "cameras": cameras,
-        "options": dict(options or {}),
+        "options": options or {},
         "t": found.t,
         "x": found.x,
         "curve": np.hstack([part @ turn for part in states]),
-        "tracks": list(found.tracks),
+        "tracks": found.tracks,
         "residuals": missed,
     }
-    return {key: as_json(value, f"found[{key!r}]") for key, value in content.items()}
+    return as_json(content, "found")
 
 
 def _law(found: Discovery, frame: str) -> dict[str, object]:
@@ -370,22 +364,12 @@ def _look(
     index: int | Sequence[int],
 ) -> Figure:
     """A frame of each view, white where there is no video, with its whole track over it."""
-    names = enumerate(_names(paths, len(tracks)))
-    titles = [f"{_short(name, i)}, frame {frames[i]}" for i, name in names]
+    titles = [f"camera {i + 1}, frame {k}" for i, k in enumerate(frames)]
     images = [
         np.full((height, width, 3), 255, np.uint8) if paths is None else read_frame(paths[i], k)
         for i, ((width, height), k) in enumerate(zip(sizes, frames, strict=True))
     ]
     return plot_frames(images, titles, tracks, index)
-
-
-def _short(name: str, i: int) -> str:
-    """A video's name as it fits above its picture, where a dollar sign would begin a formula."""
-    glyphs = get_font(findfont("sans")).get_charmap()
-    if any(ord(letter) not in glyphs for letter in name):
-        return f"video {i + 1}"
-    fitting = name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
-    return fitting.replace("$", r"\$")
 
 
 def _picture(plot: Callable[..., Figure], *shown: object) -> bytes:
@@ -421,18 +405,9 @@ def law_over_videos(found: VideoDiscovery, paths: Sequence[str | Path]) -> bytes
     """
     instants = range(0, len(found.t), -(-len(found.t) // _INSTANTS))
     views = [_view(found, Path(path), i, instants) for i, path in enumerate(paths)]
-    file = io.BytesIO()
-    with av.open(file, "w", format="webm") as container:
-        options = {"deadline": "realtime", "cpu-used": "8", "crf": "36", "b": "0"}
-        stream = container.add_stream("libvpx-vp9", _RATE, options=options)
-        for k, images in enumerate(zip(*views, strict=True)):
-            side_by_side = np.hstack(images)
-            if k == 0:
-                stream.width, stream.height = side_by_side.shape[1::-1]
-                stream.pix_fmt = "yuv420p"
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(side_by_side, "rgb24")))
-        container.mux(stream.encode(None))
-    return file.getvalue()
+    frames = (np.hstack(images) for images in zip(*views, strict=True))
+    with tempfile.TemporaryDirectory() as own:
+        return write_video(Path(own) / "law.webm", frames, _RATE, "VP9").read_bytes()
 
 
 def _view(found: VideoDiscovery, path: Path, i: int, instants: range) -> Iterator[Image]:
@@ -458,8 +433,7 @@ def _view(found: VideoDiscovery, path: Path, i: int, instants: range) -> Iterato
 
 def _drawn(image: Image, trail: Floats, spread: float) -> Image:
     """A frame with the last part of the curve, the tube around it, and a ring at its end."""
-    shown = trail[np.isfinite(trail).all(axis=1)]
-    shown = shown[(np.abs(shown) < 10 * _HEIGHT).all(axis=1)]
+    shown = trail[(np.abs(trail) < 10 * _HEIGHT).all(axis=1)]  # and no NaN
     if not len(shown):
         return image
     line = [np.rint(shown).astype(np.int32)[:, None]]
@@ -494,10 +468,7 @@ def write_pick_page(paths: Sequence[str | os.PathLike], out: str | os.PathLike) 
     FileNotFoundError, ValueError
         If a video is missing or none, or another file is at `out`.
     """
-    out = check_page("out", out, "pick.html")
-    text = page("pick.html", videos=[_video(Path(path)) for path in paths])
-    write_file(out, text.encode())
-    return out
+    return write_page("out", out, "pick.html", videos=(_video(Path(path)) for path in paths))
 
 
 def _video(path: Path) -> dict[str, object]:

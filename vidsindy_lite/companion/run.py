@@ -2,7 +2,7 @@
 
 The .py half of a pair is the source. A run leaves what it makes in build/runs/ of its output, and
 is not repeated there while the code cells, the package and the libraries are the same. From there
-`compare.refresh` puts into figures/, and this module into ``notebooks/``, what differs from
+`compare.replace` puts into figures/, and this module into ``notebooks/``, what differs from
 what is there already.
 """
 
@@ -28,9 +28,9 @@ import papermill
 from filelock import FileLock
 from nbformat import NotebookNode
 from papermill.exceptions import strip_color
-from tqdm import tqdm
 
 from ..checks import check_choice
+from ..progress import bar
 from ..storage import PACKAGE, code_hash, repository_root, write_file
 from .artifacts import read_records, with_palette, write_index
 from .compare import outdated, replace, same_notebook
@@ -107,17 +107,13 @@ def select_notebooks(names: Iterable[str], root: str | os.PathLike) -> tuple[Pat
 
 
 def run(
-    notebooks: Iterable[str] = (),
-    profile: str = "full",
-    *,
-    force: bool = False,
-    root: str | os.PathLike | None = None,
+    notebooks: Iterable[str] = (), profile: str = "full", *, force: bool = False
 ) -> list[Outcome]:
     """Execute notebooks, three at a time, and write what differs; goes on after a failure.
 
-    The full profile writes notebooks/ and figures/ of the repository, the quick one the same
-    into build/quick/. A notebook that fails changes nothing there; what it made until then lies in
-    build/runs/.
+    The full profile writes notebooks/ and figures/ of the repository around the working directory,
+    the quick one the same into build/quick/. A notebook that fails changes nothing there; what it
+    made until then lies in build/runs/.
 
     Parameters
     ----------
@@ -127,8 +123,6 @@ def run(
         Handed to each notebook as its parameter `profile`.
     force : bool
         Execute also what has been executed here with the same code.
-    root : path, optional
-        The repository; by default the one around the working directory.
 
     Returns
     -------
@@ -142,8 +136,8 @@ def run(
     FileNotFoundError
         If there is no repository around the working directory.
     """
-    root = repository_root() if root is None else Path(root).resolve()
     check_choice("profile", profile, PROFILES)
+    root = repository_root()
     output = root if profile == "full" else root / "build" / "quick"
     chosen, figures = select_notebooks(notebooks, root), output / "figures"
     known = {path.stem for path in find_notebooks(root)}
@@ -153,28 +147,23 @@ def run(
     by_size = sorted(chosen, key=lambda path: -path.stat().st_size)
     work = partial(_outcome, profile=profile, output=output, force=force)
     outcomes = []
-    bar = tqdm(total=len(chosen), desc="notebooks", leave=False, disable=None)
+    shown = bar(None, "notebooks", total=len(chosen), leave=False)
     try:
-        with ThreadPool(AT_ONCE) as pool, bar:
+        with ThreadPool(AT_ONCE) as pool, shown:
             for outcome in pool.imap_unordered(work, by_size):
                 outcomes.append(outcome)
-                with tqdm.external_write_mode():
+                with shown.external_write_mode():
                     print(outcome, flush=True)
-                bar.update()
+                shown.update()
     finally:
-        for process in _RUNNING:
+        for process in tuple(_RUNNING):  # which changes as they end
             process.terminate()
     write_index(figures)
     return sorted(outcomes, key=lambda outcome: outcome.notebook)
 
 
 def execute(
-    path: str | os.PathLike,
-    parameters: Mapping[str, object],
-    folder: str | os.PathLike,
-    *,
-    environment: Mapping[str, str] | None = None,
-    timeout: float = CELL_TIMEOUT,
+    path: str | os.PathLike, parameters: Mapping[str, object], folder: str | os.PathLike
 ) -> NotebookNode:
     """Run a notebook's source half through papermill, in its own folder.
 
@@ -185,11 +174,7 @@ def execute(
     parameters : mapping
         Values for names of the parameters cell.
     folder : path
-        Receives the executed notebook and what was written to stderr.
-    environment : mapping of str to str, optional
-        Environment variables for the kernel, beside those of this process.
-    timeout : float
-        Seconds that one cell may take.
+        Receives the executed notebook, what was written to stderr, and in figures/ what it saves.
 
     Returns
     -------
@@ -205,7 +190,7 @@ def execute(
         stops the run early: after ``sys.exit(0)`` papermill reports success, but cells were left
         out.
     """
-    path, folder = Path(path), Path(folder)
+    path, folder = Path(path), Path(folder).resolve()
     source = jupytext.read(path)
     known = papermill.inspect_notebook(source)
     if strange := parameters.keys() - known:
@@ -221,13 +206,14 @@ def execute(
         "OMP_NUM_THREADS": "1",
         "OPENCV_FOR_THREADS_NUM": "1",
         **os.environ,
-        **(environment or {}),
+        "VIDSINDY_FIGURES": str(folder / "figures"),
+        "VIDSINDY_NOTEBOOK": path.stem,
         "PYTHONPATH": os.pathsep.join(filter(None, paths)),  # the kernel imports this very package
         "PYTHONHASHSEED": "0",  # the order of a set is then the same in every run
     }
     command: list[str | Path] = [
         sys.executable, "-c", PAPERMILL, folder / EXECUTED, folder / EXECUTED, *OPTIONS,
-        "--cwd", path.parent, "--execution-timeout", str(round(timeout)),
+        "--cwd", path.parent, "--execution-timeout", str(CELL_TIMEOUT),
         "-y", json.dumps(dict(parameters)),
     ]  # fmt: skip
     for _ in range(STARTS):
@@ -287,7 +273,6 @@ def _outcome(path: Path, profile: str, output: Path, force: bool) -> Outcome:
     folder = output / "build" / "runs" / f"{path.stem}-{profile}"
     folder.mkdir(parents=True, exist_ok=True)
     running = folder / "running"
-    places = {"VIDSINDY_FIGURES": f"{running}/figures", "VIDSINDY_NOTEBOOK": path.stem}
     try:
         with FileLock(folder / "lock"):  # until no other run is at this notebook
             source = jupytext.read(path)
@@ -296,7 +281,7 @@ def _outcome(path: Path, profile: str, output: Path, force: bool) -> Outcome:
                 began = time.perf_counter()
                 for earlier in folder.glob("*/"):
                     shutil.rmtree(earlier)
-                execute(path, {"profile": profile}, running, environment=places)
+                execute(path, {"profile": profile}, running)
                 # What was edited meanwhile is of no code that anybody will have again.
                 as_before = kept.name == _key(jupytext.read(path))
                 kept = running.rename(kept if as_before else folder / "edited")

@@ -238,15 +238,22 @@ class _Codec(NamedTuple):
     """Format of the pixels that it codes."""
     bits: int = 0
     """Bits per pixel and frame that a lossy codec may use: as many as OpenCV grants it."""
+    options: dict[str, str] = {}
+    """Of the encoder."""
 
 
 CODECS = {
-    "qtrle": _Codec((".mov",), "qtrle", "rgb24"),
+    # Frames from one that stands on its own to the next: a jump costs half of that.
+    "qtrle": _Codec((".mov",), "qtrle", "rgb24", options={"g": "50"}),
     "FFV1": _Codec((".mkv", ".avi"), "ffv1", "bgr0"),
     "mp4v": _Codec((".mp4",), "mpeg4", "yuv420p", 1),
     "H264": _Codec((".mp4", ".mkv"), "libx264", "yuv420p"),
     "MJPG": _Codec((".avi", ".mkv"), "mjpeg", "yuvj420p", 3),
-}
+    "VP9": _Codec(
+        (".webm",), "libvpx-vp9", "yuv420p",
+        options={"deadline": "realtime", "cpu-used": "8", "crf": "36", "b": "0"},
+    ),
+}  # fmt: skip
 
 
 class VideoInfo(NamedTuple):
@@ -282,8 +289,9 @@ def write_video(
         Red, green and blue, all of one size.
     fps : float or Fraction
         Frames per second, in [0.01, 10000]; at most 1000 in .mkv, whose clock counts milliseconds.
-    codec : {"qtrle", "FFV1", "mp4v", "MJPG", "H264"}, optional
-        Lossless by default; "mp4v", "MJPG" and "H264", which phones write, are lossy.
+    codec : {"qtrle", "FFV1", "mp4v", "MJPG", "H264", "VP9"}, optional
+        Lossless by default; "mp4v", "MJPG", "H264", which phones write, and "VP9", which pages
+        show (.webm), are lossy.
 
     Returns
     -------
@@ -377,8 +385,7 @@ def _add_stream(
     container: OutputContainer, codec: _Codec, rate: Fraction, size: tuple[int, int]
 ) -> VideoStream:
     """A stream that takes the frames; the same bytes on any number of cores."""
-    # Frames from one that stands on its own to the next: a jump costs half of that.
-    options = {"g": "50"} if codec.encoder == "qtrle" else {}
+    options = dict(codec.options)
     stream = cast("VideoStream", container.add_stream(codec.encoder, rate, options=options))
     stream.width, stream.height = size
     stream.pix_fmt = codec.pixels
