@@ -8,6 +8,7 @@ file it was if that is malformed.
 from __future__ import annotations
 
 import ast
+import glob
 import hashlib
 import json
 import os
@@ -191,7 +192,8 @@ def write_file(path: Path, content: bytes) -> None:
 def write_files(contents: Mapping[Path, bytes]) -> None:
     """Replace files when all are written beside them; a link is followed, a device written to.
 
-    A full disk or a killed run leaves the old ones.
+    A full disk or a killed run leaves the old ones. What a killed run of this machine has left
+    beside them is removed.
     """
     beside: dict[Path, Path] = {}
     try:
@@ -201,6 +203,9 @@ def write_files(contents: Mapping[Path, bytes]) -> None:
                 path.write_bytes(content)
                 continue
             path.parent.mkdir(parents=True, exist_ok=True)
+            for left in path.parent.glob(f".{glob.escape(path.name)}.*"):
+                if left.suffix[1:].isdecimal() and not _is_running(int(left.suffix[1:])):
+                    left.unlink(missing_ok=True)
             beside[path] = path.with_name(f".{path.name}.{os.getpid()}")
             beside[path].write_bytes(content)
             if path.exists():
@@ -210,6 +215,15 @@ def write_files(contents: Mapping[Path, bytes]) -> None:
     finally:
         for new in beside.values():
             new.unlink(missing_ok=True)
+
+
+def _is_running(process: int) -> bool:
+    """Whether a process of this number is there; where that cannot be told, it is."""
+    try:
+        os.kill(process, 0) if os.name == "posix" else None
+    except (ProcessLookupError, PermissionError, OverflowError) as error:
+        return not isinstance(error, ProcessLookupError)
+    return True
 
 
 # ----------------------------------------------------------------------------------- the repository

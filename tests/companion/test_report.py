@@ -2,8 +2,11 @@
 
 import io
 import json
+import os
 import re
 import shutil
+import subprocess
+import sys
 import tomllib
 import warnings
 from collections import Counter
@@ -155,11 +158,18 @@ def test_a_report_that_fails_leaves_what_was_there(case, old, tmp_path, monkeypa
     assert not (tmp_path / "new").exists()
 
 
-def test_of_a_report_the_page_is_put_in_place_first(case, old, monkeypatch):
+def test_what_a_killed_run_has_left_is_cleared_by_the_next(case, old, monkeypatch):
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    for name in FILES:
+        (old / f".{name}.{gone.pid}").write_text("left")
+        (old / f".{name}.{os.getppid()}").write_text("of a run that goes on")
     order, write = [], report.write_files
     monkeypatch.setattr(report, "write_files", lambda files: order.extend(files) or write(files))
     write_report(case[0], None, old)
     assert order[0].name == "report.html"  # which tells whose the others are, if this is killed
+    hidden = {f".{name}.{os.getppid()}" for name in FILES}
+    assert {path.name for path in old.iterdir()} == {*FILES, *hidden, "thesis.tex"}
 
 
 def test_other_peoples_files_are_not_overwritten(tmp_path):
