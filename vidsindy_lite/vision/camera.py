@@ -273,12 +273,6 @@ class CameraMotion(NamedTuple):
     maps: Floats
     errors: Floats
 
-    @classmethod
-    def of(cls, maps: Floats, errors: Floats, factor: int) -> CameraMotion:
-        """By maps of frames that are reduced by a factor, and errors in their pixels."""
-        larger = rescaled(maps, 1 / factor)
-        return cls(larger / larger[:, 2:, 2:], factor * errors)
-
     @property
     def moves(self) -> bool:
         """Does the camera move at all?"""
@@ -293,7 +287,8 @@ def at_rest(n: int) -> CameraMotion:
 def rescaled(maps: Floats, factor: float) -> Floats:
     """Maps (n, 3, 3) of pixels of an image as maps of those of the image reduced by a factor."""
     larger = np.array([[factor, 0, (factor - 1) / 2], [0, factor, (factor - 1) / 2], [0, 0, 1]])
-    return np.asarray(np.linalg.inv(larger) @ maps @ larger, float)
+    found = np.linalg.inv(larger) @ maps @ larger
+    return np.asarray(found / found[:, 2:, 2:], float)
 
 
 def stands_still(samples: Iterable[Image]) -> bool | None:
@@ -432,7 +427,7 @@ def steadied(frames: Iterable[Image], factor: int) -> CameraMotion:
         # error to all that follow, so late: a little above the 0.3 that `align` needs.
         if key.shared(last) < 0.4:
             key, last = before, np.eye(3)
-    return CameraMotion.of(np.array(maps), np.array(errors), factor)
+    return CameraMotion(rescaled(np.array(maps), 1 / factor), factor * np.array(errors))
 
 
 def explains(samples: Image, maps: Floats, known: Bools) -> bool:
@@ -445,8 +440,7 @@ def explains(samples: Image, maps: Floats, known: Bools) -> bool:
     size = samples.shape[2:0:-1]
     apart = np.array([displacement(np.linalg.inv(usual) @ maps, size) for usual in maps])
     weights = apart[apart.sum(axis=1).argmin()]
-    all_known = np.ones(len(maps), bool)
-    moved, rested = (_missed(samples, Plate(samples, at, all_known), at) for at in (maps, rest))
+    moved, rested = (_missed(samples, Plate(samples, at), at) for at in (maps, rest))
     gains = [_gain(*both) for both in zip(moved, rested, strict=True)]
     # Of a gain: the noise of a median of 21 frames adds that, and maps smooth it.
     return bool(weights @ gains > 0.04 * weights.sum())
@@ -459,7 +453,7 @@ def rests(samples: Image) -> bool:
     axis only.
     """
     rest = np.broadcast_to(np.eye(3), (len(samples), 3, 3))
-    plate = Plate(samples, rest, np.ones(len(samples), bool))
+    plate = Plate(samples, rest)
     here, *beside = (
         _missed(samples, plate, rest + np.array([[0, 0, u], [0, 0, v], [0, 0, 0]]))
         for u, v in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
@@ -484,9 +478,7 @@ def _misses(frame: Image, ground: Image, known: Bools) -> Floats32:
     apart = np.minimum(lengths(np.asarray(smooth, np.float32)), 20.0)
     # Around what is not known smoothing is wrong.
     use = cv2.erode(known.astype(np.uint8), np.ones((9, 9))).astype(np.float32)
-    parts, share = (
-        cv2.resize(x, (PARTS, PARTS), interpolation=cv2.INTER_AREA) for x in (apart * use, use)
-    )
+    parts, share = _by_blocks(apart * use), _by_blocks(use)
     return np.where(share > 0.5, parts / np.maximum(share, 0.5), np.nan).astype(np.float32)
 
 

@@ -29,15 +29,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from ..checks import check_integer
-from .background import (
-    LONGEST,
-    Plate,
-    carry,
-    lights_of,
-    noise_of,
-    sample_frames,
-    sampled,
-)
+from .background import Plate, carry, lights_of, noise_of, sampled
 from .camera import LOOSE, CameraMotion, at_rest, camera_motion, rescaled, stands_still
 from .candidates import (
     TOLD,
@@ -55,6 +47,7 @@ from .candidates import (
 from .refining import Lens, View, entire, fitting, roughness, swapped
 from .video import Reel, reduce
 
+_LONGEST = 480  # pixels of the longer side of a reduced frame
 _SHORTEST = 5  # frames of a path
 _LOUD = 12.0  # grey levels of noise, in more of which no pixel is told alone
 _LOOKS_ALONE = "no view tells it from its ground: it is followed by its looks alone"
@@ -123,9 +116,8 @@ class Film(NamedTuple):
     @classmethod
     def of(cls, path: str | os.PathLike, *, rests: bool = False) -> Self:
         """From its sampled frames, and from all of them if its camera may move."""
-        frames = Reel(path, LONGEST)
-        samples = sample_frames(frames)
-        numbers = sampled(frames.info.frames)[: len(samples)]
+        frames = Reel(path, _LONGEST)
+        numbers, samples = sampled(frames)
         small = np.array([reduce(sample, frames.factor) for sample in samples])
         doubts: tuple[str, ...] = ()
         motion = at_rest(frames.info.frames)
@@ -145,7 +137,10 @@ class Film(NamedTuple):
         hide = None if boxes is None else boxes[self.sampled]
         if hide is not None:  # in the others it may be anywhere
             known &= np.isfinite(hide[:, 0])
-        plate = Plate(samples, here, known, hide, self.lights)
+        use = np.flatnonzero(known)
+        # The samples are views: copies would fill the memory.
+        plate = Plate([samples[i] for i in use], here[use], hide if hide is None else hide[use],
+                      self.lights[use])  # fmt: skip
         return plate, noise_of(samples, here, plate)
 
 
@@ -172,7 +167,7 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
         return nothing(film.motion, n)
     boxes = None
     for k in range(3):  # if it covers its own ground: before ground that is without it
-        covered = _covering(seen, paths[0].rows, n, seed, rims=k == 0) if paths else None
+        covered = _covering(film, seen, paths[0].rows, seed, rims=k == 0) if paths else None
         if covered is None or (boxes is not None and _same(covered, boxes)):
             break
         boxes = covered
@@ -287,15 +282,16 @@ def _rivals(paths: Sequence[Motion]) -> Sequence[Motion]:
 
 
 def _covering(
-    seen: Candidates, rows: Ints, n: int, seed: Spot | None, *, rims: bool
+    film: Film, seen: Candidates, rows: Ints, seed: Spot | None, *, rims: bool
 ) -> Floats | None:
     """Boxes (n, 4) of a target that covers its own ground in many frames, None if it does not.
 
     Of one that hardly leaves its place a plate with it shows the `rims` only: all that differs
     there is the target's place.
     """
-    centre, size = seen.centre[rows], seen.box[rows, 2:]
-    if _staying(centre, size) < 0.35:
+    centre, size, n = seen.centre[rows], seen.box[rows, 2:], len(film.maps)
+    # The median of the samples does not show what is in one or two of them.
+    if np.isin(film.sampled, seen.frame[rows]).sum() < 3 or _staying(centre, size) < 0.35:
         return None
     low = np.percentile(seen.box[rows, :2], 5, axis=0)
     high = np.percentile(seen.box[rows, :2] + seen.box[rows, 2:], 95, axis=0)
