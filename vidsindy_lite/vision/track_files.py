@@ -143,7 +143,9 @@ def read_tracks(path: str | os.PathLike, individual: str | None = None) -> list[
         elif text.lstrip().lower().startswith("#kinovea"):
             header, rows = _of_kinovea(text)
         else:
-            header, rows = _split(_cells(text))
+            cells = _cells(text)
+            start = next((i for i, row in enumerate(cells) if _is_of_numbers(row)), len(cells))
+            header, rows = cells[:start], cells[start:]
         if not rows:
             raise ValueError("must hold rows of numbers, got none")
         return _tracks(path.name, header, rows, individual)
@@ -241,12 +243,6 @@ def _of_kinovea(text: str) -> tuple[list[list[str]], list[list[str]]]:
 def _plain(cell: str) -> str:
     """The name of a column without its unit, if that is pixels."""
     return re.sub(r"\s*[(\[](px|pixels?)[)\]]$", "", cell.strip().lower())
-
-
-def _split(cells: list[list[str]]) -> tuple[list[list[str]], list[list[str]]]:
-    """Header and numbers."""
-    start = next((i for i, row in enumerate(cells) if _is_of_numbers(row)), len(cells))
-    return cells[:start], cells[start:]
 
 
 def _is_of_numbers(row: Sequence[str]) -> bool:

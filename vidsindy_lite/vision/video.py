@@ -33,6 +33,7 @@ import numpy as np
 
 from ..arrays import Floats, Image
 from ..checks import check_choice, check_instance, check_integer, check_number, check_path
+from ..storage import check_file
 
 if TYPE_CHECKING:
     from av import VideoFrame
@@ -550,9 +551,7 @@ def _opened(path: str | os.PathLike) -> Iterator[tuple[InputContainer, VideoStre
     """A video file while it is open, and the stream of it that matters."""
     import av
 
-    path = check_path("path", path)
-    if not path.is_file():
-        raise FileNotFoundError(f"path: no such video file, got {str(path)!r}")
+    path = check_file("path", path, "video file")
     if path.stat().st_size == 0:
         raise ValueError(f"path: must be a video file, got the empty file '{path}'")
     try:
