@@ -89,7 +89,7 @@ CLOUDY = 320, 240
 
 def align(before, after):
     """The map of one view to another, about which nothing is known."""
-    return align_on(Look(before).grounds, Look(after).levels, np.eye(3))
+    return align_on(Look(before), Look(after), np.eye(3))
 
 
 def sight(seed, here=None, noise=2.0, contrast=20, light=1.0):

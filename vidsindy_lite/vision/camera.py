@@ -44,27 +44,6 @@ _MANY = 60  # corners that need no other witness
 _AGREE = 0.25  # share of the corners that must do so: of those of mere noise, 0.15 to 0.24 agree
 
 
-class Ground(NamedTuple):
-    """One level of a view on which others are laid.
-
-    Its grey levels, by what each pixel changes with shift, turn, scale and light, (6, h, w), and
-    how much each may tell.
-    """
-
-    grey: Floats32
-    slopes: Floats32
-    share: Floats32
-
-    @classmethod
-    def of(cls, grey: Floats32) -> Ground:
-        slopes = _slopes(grey)
-        power = _by_blocks(slopes[0] ** 2 + slopes[1] ** 2)
-        # Times what a usual block tells, that one block may tell at most.
-        fair = np.minimum(1, 4.0 * np.median(power) / np.maximum(power, 1e-9))
-        share = cv2.resize(fair, grey.shape[::-1], interpolation=cv2.INTER_LINEAR)
-        return cls(grey, slopes, np.asarray(share, np.float32))
-
-
 class Aligned(NamedTuple):
     """The map (3, 3) of one view to another, and the standard error of the places it gives."""
 
@@ -88,9 +67,9 @@ class Look:
         return [np.asarray(cv2.GaussianBlur(one, (0, 0), 1), np.float32) for one in levels[1:]]
 
     @cached_property
-    def grounds(self) -> list[Ground]:
-        """These, as others are laid on them."""
-        return [Ground.of(grey) for grey in self.levels]
+    def slopes(self) -> list[Floats32]:
+        """By what each pixel of these changes, see `_slopes`."""
+        return [_slopes(grey) for grey in self.levels]
 
     @cached_property
     def relief(self) -> Image:
@@ -131,29 +110,22 @@ class Look:
         return self.corners[good], ends[good]
 
 
-def align(before: list[Ground], after: list[Floats32], guess: Floats) -> Aligned | None:
+def align(before: Look, after: Look, guess: Floats) -> Aligned | None:
     """The map of one view to another, from a guess; None where they have little in common.
 
     Its error is infinite where the views tell no more than the guess.
-
-    Parameters
-    ----------
-    before : list of Ground
-    after : list of ndarray
-        The `levels` of a `Look`.
-    guess : ndarray, shape (3, 3)
-        In pixels of the images of which these are levels.
     """
-    if not before:  # images too small for a pyramid
+    if not before.levels:  # images too small for a pyramid
         return None
-    size = 2 * np.array(before[0].grey.shape[::-1])
+    size = 2 * np.array(before.levels[0].shape[::-1])
     found = Aligned(_as_similarity(guess, size), np.inf)
-    for level in range(len(before), 0, -1):
+    for level in range(len(before.levels), 0, -1):
         scale, back = (np.diag([x, x, 1.0]) for x in (0.5**level, 2.0**level))
         here = scale @ found.map @ back
         # Grey levels from which on a pixel is left aside.
         loose = 40.0 if level > 1 else 0.0
-        fitted = _fit(before[level - 1], after[level - 1], here, scale[0, 0], loose)
+        both = before.slopes[level - 1], after.levels[level - 1]
+        fitted = _fit(*both, here, scale[0, 0], loose)
         if fitted is None:
             return None
         found = Aligned(back @ fitted.map @ scale, 2 * fitted.error)
@@ -174,11 +146,15 @@ def _as_similarity(guess: Floats, size: Ints) -> Floats:
 
 
 def _fit(
-    ground: Ground, view: Floats32, here: Floats, scale: float, loose: float
+    slopes: Floats32, view: Floats32, here: Floats, scale: float, loose: float
 ) -> Aligned | None:
     """One level: Gauss-Newton steps of which each refines the map by what the key's slopes say."""
-    key, slopes, share = ground
+    key = slopes[4]
     height, width = key.shape
+    power = _by_blocks(slopes[0] ** 2 + slopes[1] ** 2)
+    # Times what a usual block tells, that one block may tell at most.
+    fair = np.minimum(1, 4.0 * np.median(power) / np.maximum(power, 1e-9))
+    share = cv2.resize(fair, (width, height), interpolation=cv2.INTER_LINEAR)
     middle = np.array([[1, 0, (width - 1) / 2], [0, 1, (height - 1) / 2], [0, 0, 1.0]])
     to_middle = np.linalg.inv(middle)
     steep = slopes.reshape(6, -1)
@@ -326,7 +302,7 @@ def _moved(before: Look, after: Look) -> bool | None:
 
 def _drifted(before: Look, after: Look) -> bool | None:
     """Do all pixels tell of a motion, where corners are few? None if these are mute, too."""
-    found = align(before.grounds, after.levels, np.eye(3))
+    found = align(before, after, np.eye(3))
     if found is None or found.error > _VAGUE:
         return None
     moved = displacement(found.map[None], before.grey.shape[::-1])[0]
@@ -384,7 +360,7 @@ class _Key(NamedTuple):
         told, alone = _by_corners(self.look, look, last)
         if alone:
             return told
-        direct = align(self.look.grounds, look.levels, last)
+        direct = align(self.look, look, last)
         both = [one for one in (told, direct) if one is not None and one.error < _VAGUE]
         best = min((one.error for one in both), default=0.0)
         # Times the error of another map that is about as good; then the smaller step is taken.
