@@ -366,11 +366,9 @@ def _differing(seen: Candidates, path: Candidates) -> float:
 
 def lens_of(film: Film, *ways: Ways) -> Lens:
     """What looks at targets in whole frames."""
-    boxes = None
-    for way in ways:
-        if _staying(way.centre[film.sampled], way.box[film.sampled, 2:]) > 0.25:
-            boxes = way.box
-    return Lens(*film.ground(boxes, whole=True))
+    at = film.sampled
+    staying = [way.box for way in ways if _staying(way.centre[at], way.box[at, 2:]) > 0.25]
+    return Lens(*film.ground(staying[-1] if staying else None, whole=True))
 
 
 def viewed(film: Film, lens: Lens, ways: Ways, lights: list[Floats32]) -> list[View | None]:
@@ -595,7 +593,7 @@ def _lanes(
     seen: Candidates, paths: list[Motion], count: int
 ) -> tuple[list[list[Motion]], list[Motion]]:
     """The paths of each target, one after the other in time; and paths for which none is left."""
-    lanes: list[list[Motion]] = []
+    lanes: list[list[Motion]] = [[] for _ in range(count)]
     left = []
     plainest = max((path.rating / len(path.rows) for path in paths), default=0.0)
     taken = np.zeros((count, 1 + seen.frame.max(initial=0)), bool)
@@ -609,10 +607,8 @@ def _lanes(
             left.append(path)
             continue
         taken[free[0], first : last + 1] = True
-        if free[0] == len(lanes):
-            lanes.append([])
         lanes[free[0]].append(path)
-    return lanes, left
+    return [lane for lane in lanes if lane], left
 
 
 def _joined(ways: list[Ways]) -> Ways:

@@ -219,8 +219,7 @@ def _usual_ones(views: Sequence[View | None]) -> list[View | None]:
     off = np.abs(np.log(np.maximum(areas, 1e-3) / usual[:, None]))
     # Areas of whole views scatter by less.
     better = off[:, 1] < np.minimum(off[:, 0], np.log(1.15))
-    best = [replace(one.whole, whole=one.whole) if one and one.whole and fits else one
-            for one, fits in zip(views, better, strict=True)]  # fmt: skip
+    best = [one.whole if one and fits else one for one, fits in zip(views, better, strict=True)]
     return [one if one and one.area > 0 else None for one in best]
 
 
