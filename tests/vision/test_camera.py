@@ -6,9 +6,9 @@ import pytest
 from footage import Phone, render_phone, write_phone
 
 from vidsindy_lite import track
-from vidsindy_lite.vision.background import carry, sampled
 from vidsindy_lite.vision.camera import Look, camera_motion, rescaled, stands_still, steadied
 from vidsindy_lite.vision.camera import align as align_on
+from vidsindy_lite.vision.plate import carry, sampled
 from vidsindy_lite.vision.video import Reel, write_video
 
 

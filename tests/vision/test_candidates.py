@@ -6,7 +6,6 @@ import pytest
 from helpers import one_a_frame
 
 from vidsindy_lite import write_video
-from vidsindy_lite.vision.background import shadowed
 from vidsindy_lite.vision.candidates import (
     TOLD,
     Appearance,
@@ -17,6 +16,7 @@ from vidsindy_lite.vision.candidates import (
     followed,
     plainest_paths,
 )
+from vidsindy_lite.vision.plate import shadowed
 from vidsindy_lite.vision.video import Reel
 
 

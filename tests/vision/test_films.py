@@ -14,7 +14,7 @@ from vidsindy_lite import Hint, track, write_video
 from vidsindy_lite.vision import Track, load_hints
 from vidsindy_lite.vision.camera import CameraMotion, at_rest
 from vidsindy_lite.vision.candidates import Candidates
-from vidsindy_lite.vision.moving import expected, finished, unsure
+from vidsindy_lite.vision.film import expected, finished, unsure
 from vidsindy_lite.vision.refining import View, roughness
 from vidsindy_lite.vision.rendering import BACKGROUNDS
 

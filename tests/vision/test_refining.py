@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.background import Plate
+from vidsindy_lite.vision.plate import Plate
 from vidsindy_lite.vision.refining import Lens, View, entire, fitting, scatter
 
 GROUND = np.full((60, 80, 3), (60, 90, 120), np.uint8)

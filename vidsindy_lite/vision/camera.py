@@ -30,7 +30,7 @@ import cv2
 import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import Plate, carry, changes, lengths, light
+from .plate import Plate, carry, changes, lengths, light
 from .video import Reel
 
 _BEYOND = -1e6  # in place of grey levels where nothing is shown: what it has a part in is below 0
@@ -230,8 +230,9 @@ def _error(slopes: Floats32, pull: Floats32, information: Floats) -> float:
     """
     height, width = (side // PARTS for side in pull.shape)
     pulls = (slopes * pull)[:, : height * PARTS, : width * PARTS]
-    means = np.array([_by_blocks(by) for by in pulls], float).reshape(6, -1)
-    sums = height * width * means
+    sums = (
+        pulls.reshape(6, PARTS, height, PARTS, width).sum(axis=(2, 4), dtype=float).reshape(6, -1)
+    )
     covariance = np.linalg.inv(information)
     blockwise = covariance @ (sums @ sums.T) @ covariance
     variance = np.maximum(np.diag(blockwise), np.diag(covariance))
@@ -485,11 +486,9 @@ def camera_motion(
     motion = _followed(frames, small, sampled) if still is False else None
     if motion is not None:
         return motion, ()
-    doubts: tuple[str, ...] = ()
-    if not still and not rests(small):
-        doubts = ("the background is too plain to tell whether the camera moves: if so, its "
-                  "motion is part of the track",)  # fmt: skip
-    return at_rest(frames.info.frames), doubts
+    plain = ("the background is too plain to tell whether the camera moves: if so, its motion is "
+             "part of the track")  # fmt: skip
+    return at_rest(frames.info.frames), () if still or rests(small) else (plain,)
 
 
 def _followed(frames: Reel, small: Image, sampled: Ints) -> CameraMotion | None:

@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from ..checks import check_integer, check_vector, shown
 from ..storage import check_file, read_tree
-from .background import Plate, carry, changes, least_difference, lengths, light, shadowed, tolerance
+from .plate import Plate, carry, changes, least_difference, lengths, light, shadowed, tolerance
 from .video import Reel
 
 _KEPT = 16  # candidates of a frame

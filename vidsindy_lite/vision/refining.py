@@ -30,7 +30,7 @@ from scipy.ndimage import maximum_filter1d, median_filter
 from scipy.spatial.distance import cdist
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import Plate, dot, least_difference, lengths, relit, shadowed, tolerance
+from .plate import Plate, dot, least_difference, lengths, relit, shadowed, tolerance
 
 _UNEVEN = 0.12  # share by which a shadow may darken the colours of a pixel unlike each other
 _WHOLE = 1.5  # factor by which the areas of whole views differ from those around them

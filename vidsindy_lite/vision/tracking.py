@@ -31,7 +31,7 @@ from ..arrays import Floats, Floats32, Image
 from ..checks import MALFORMED, check_instance, shown
 from ..storage import check_file
 from .candidates import Candidates, Hint, as_written, best_path
-from .moving import Track, follow
+from .film import Track, follow
 from .video import read_video, video_info
 
 DETECTORS = ("auto", "background", "learned")

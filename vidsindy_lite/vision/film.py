@@ -29,7 +29,6 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from ..checks import check_integer
-from .background import Plate, carry, lights_of, noise_of, sampled
 from .camera import LOOSE, CameraMotion, at_rest, camera_motion, rescaled, stands_still
 from .candidates import (
     TOLD,
@@ -44,6 +43,7 @@ from .candidates import (
     plainest_paths,
     uncommon,
 )
+from .plate import Plate, carry, lights_of, noise_of, sampled
 from .refining import Lens, View, entire, fitting, roughness, swapped
 from .video import Reel, reduce
 

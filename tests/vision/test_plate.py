@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.background import (
+from vidsindy_lite.vision.plate import (
     Plate,
     least_difference,
     lights_of,
