@@ -230,9 +230,8 @@ def _error(slopes: Floats32, pull: Floats32, information: Floats) -> float:
     """
     height, width = (side // PARTS for side in pull.shape)
     pulls = (slopes * pull)[:, : height * PARTS, : width * PARTS]
-    sums = (
-        pulls.reshape(6, PARTS, height, PARTS, width).sum(axis=(2, 4), dtype=float).reshape(6, -1)
-    )
+    means = np.array([_by_blocks(by) for by in pulls], float).reshape(6, -1)
+    sums = height * width * means
     covariance = np.linalg.inv(information)
     blockwise = covariance @ (sums @ sums.T) @ covariance
     variance = np.maximum(np.diag(blockwise), np.diag(covariance))

@@ -1,6 +1,6 @@
 """Where the moving target is in each frame of a video file, to a fraction of a pixel.
 
-Two ways to find it stand behind one call. The film tracker (`moving`) knows all frames: it takes
+Two ways to find it stand behind one call. The film tracker (`film`) knows all frames: it takes
 out the camera's motion and the light's, and of all that differs from the ground it follows what
 moves most plainly: to a thousandth of a pixel in clean films of a camera at rest. A *detector*
 knows what targets look like and finds it in each frame on its own, whatever the background does, to
