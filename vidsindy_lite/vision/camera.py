@@ -406,13 +406,12 @@ def steadied(frames: Iterable[Image], factor: int) -> CameraMotion:
     return CameraMotion(rescaled(np.array(maps), 1 / factor), factor * np.array(errors))
 
 
-def explains(samples: Image, maps: Floats, known: Bools) -> bool:
+def explains(samples: Image, maps: Floats) -> bool:
     """Are reduced frames likelier with a camera that moves by these maps than with one at rest?
 
     Frames count by how far they are from the usual one: where that is the same, so are both plates.
     """
     rest = np.broadcast_to(np.eye(3), maps.shape)
-    samples, maps, rest = samples[known], maps[known], rest[known]
     size = samples.shape[2:0:-1]
     apart = np.array([displacement(np.linalg.inv(usual) @ maps, size) for usual in maps])
     weights = apart[apart.sum(axis=1).argmin()]
@@ -504,4 +503,5 @@ def _followed(frames: Reel, small: Image, sampled: Ints) -> CameraMotion | None:
         return None
     at = np.minimum(sampled, len(motion.maps) - 1)
     known = np.isfinite(motion.errors[at])
-    return motion if explains(small, rescaled(motion.maps[at], frames.factor), known) else None
+    maps = rescaled(motion.maps[at[known]], frames.factor)
+    return motion if explains(small[known], maps) else None
