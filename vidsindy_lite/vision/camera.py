@@ -21,7 +21,7 @@ own is in few of these: so a motion is taken only if it explains the frames bett
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -439,22 +439,22 @@ def rests(samples: Image) -> bool:
     return bool(np.mean(np.array(least) > 0) >= 0.9)
 
 
-def _missed(samples: Image, plate: Plate, maps: Floats) -> list[Floats32]:
-    """What each sample misses of a plate that lies in it by these maps, see `_misses`."""
-    return [_misses(one, *plate.seen_from(at)) for one, at in zip(samples, maps, strict=True)]
+def _missed(samples: Image, plate: Plate, maps: Floats) -> Iterator[Floats32]:
+    """Grey levels by which the parts (12, 12) of each sample differ from the plate, NaN if unknown.
 
-
-def _misses(frame: Image, ground: Image, known: Bools) -> Floats32:
-    """Grey levels by which the parts (12, 12) of a frame differ from the ground; NaN if unknown."""
-    change = changes(frame, ground, light(frame, ground, known))
-    # Reduced pixels: noise is not what frames are compared by.
-    smooth = cv2.GaussianBlur(change, (0, 0), 2.0)
-    # Grey levels that a pixel can differ by: a few that differ by more say no more.
-    apart = np.minimum(lengths(np.asarray(smooth, np.float32)), 20.0)
-    # Around what is not known smoothing is wrong.
-    use = cv2.erode(known.astype(np.uint8), np.ones((9, 9))).astype(np.float32)
-    parts, share = _by_blocks(apart * use), _by_blocks(use)
-    return np.where(share > 0.5, parts / np.maximum(share, 0.5), np.nan).astype(np.float32)
+    By these maps the samples lie in it.
+    """
+    for sample, here in zip(samples, maps, strict=True):
+        ground, known = plate.seen_from(here)
+        change = changes(sample, ground, light(sample, ground, known))
+        # Reduced pixels: noise is not what frames are compared by.
+        smooth = cv2.GaussianBlur(change, (0, 0), 2.0)
+        # Grey levels that a pixel can differ by: a few that differ by more say no more.
+        apart = np.minimum(lengths(np.asarray(smooth, np.float32)), 20.0)
+        # Around what is not known smoothing is wrong.
+        use = cv2.erode(known.astype(np.uint8), np.ones((9, 9))).astype(np.float32)
+        parts, share = _by_blocks(apart * use), _by_blocks(use)
+        yield np.where(share > 0.5, parts / np.maximum(share, 0.5), np.nan).astype(np.float32)
 
 
 def _gain(one: Floats32, other: Floats32) -> float:

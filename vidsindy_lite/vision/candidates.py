@@ -217,7 +217,7 @@ class Candidates(NamedTuple):
 
 
 def candidates(
-    frames: Iterable[Image], maps: Floats, plate: Plate, noise: float
+    frames: Iterable[Image], maps: Floats, plate: Plate, noise: float, targets: int
 ) -> tuple[Candidates, list[Floats32]]:
     """The candidates of all frames, and how much brighter each frame is than the ground."""
     lights, found = [], []
@@ -239,7 +239,7 @@ def candidates(
         ))  # fmt: skip
         found.append(one._replace(frame=one.frame + i, place=carry(here, one.centre),
                                   colour=one.colour / lit))  # fmt: skip
-    return Candidates.joined(found), lights
+    return _uncommon(Candidates.joined(found), targets), lights
 
 
 def _with_neighbours(
@@ -329,7 +329,7 @@ def _distinct(found: Candidates) -> Candidates:
     return found.only(np.array(kept, int))
 
 
-def uncommon(found: Candidates, targets: int) -> Candidates:
+def _uncommon(found: Candidates, targets: int) -> Candidates:
     """Candidates worth the less the more of them look alike in their frame than there are targets.
 
     The leaves of a tree hardly leave their places, and before a plain wall that does not tell the

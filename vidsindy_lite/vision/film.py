@@ -41,7 +41,6 @@ from .candidates import (
     candidates,
     followed,
     plainest_paths,
-    uncommon,
 )
 from .plate import Plate, carry, lights_of, noise_of, sampled
 from .refining import Lens, View, entire, fitting, roughness, swapped
@@ -108,11 +107,6 @@ class Film(NamedTuple):
     lights: Floats32
     doubts: tuple[str, ...]
 
-    @property
-    def factor(self) -> int:
-        """By how much the frames are reduced."""
-        return self.frames.factor
-
     @classmethod
     def of(cls, path: str | os.PathLike, *, rests: bool = False) -> Self:
         """From its sampled frames, and from all of them if its camera may move."""
@@ -160,7 +154,7 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
     film = Film.of(path, rests=rests)
     seen, lights = sighted(film)
     n = len(lights)
-    boxed = None if hint is None else hint.boxed(film.frames.info.size, n, film.factor)
+    boxed = None if hint is None else hint.boxed(film.frames.info.size, n, film.frames.factor)
     seed = boxed and _tightened(seen, boxed)
     paths = _paths(seen, hint, seed)
     if not paths and seed is None:
@@ -222,8 +216,7 @@ def sighted(
     if noise > _LOUD:
         frames = (np.asarray(cv2.GaussianBlur(frame, (0, 0), 1.0), np.uint8) for frame in frames)
         noise /= 2 * np.sqrt(np.pi)
-    found, lights = candidates(frames, film.maps, plate, noise)
-    return uncommon(found, targets), lights
+    return candidates(frames, film.maps, plate, noise, targets)
 
 
 def _paths(seen: Candidates, hint: Hint | None, seed: Spot | None) -> list[Motion]:
@@ -403,13 +396,13 @@ def _confidence(errors: Floats | float) -> Floats:
 def _example(film: Film, seen: Candidates, path: Motion) -> str:
     """Where somebody may look at what moves along a path."""
     row = path.rows[len(path.rows) // 2]
-    u, v = film.factor * seen.centre[row]
+    u, v = film.frames.factor * seen.centre[row]
     return f"e.g. in frame {seen.frame[row]} at ({u:.0f}, {v:.0f})"
 
 
 def _doubts(film: Film, seen: Candidates, paths: list[Motion], ways: Ways) -> tuple[str, ...]:
     """Whether the camera is known, and what else moves about as plainly, elsewhere."""
-    k = film.factor
+    k = film.frames.factor
     for path in _rivals(paths):
         at = seen.frame[path.rows]
         off = np.linalg.norm(k * seen.centre[path.rows] + (k - 1) / 2 - ways.centre[at], axis=1)
@@ -438,7 +431,7 @@ def expected(seen: Candidates, rows: Ints, film: Film, n: int) -> Ways:
     colour[:] = np.median(seen.colour[rows], axis=0)
     near = np.column_stack([np.interp(frames, at, x) for x in seen.colour[rows].T])
     colour[frames] = 0.5 * colour[frames] + 0.5 * near
-    k = film.factor
+    k = film.frames.factor
     return Ways(k * centre + (k - 1) / 2, k * box, colour)
 
 
@@ -496,7 +489,7 @@ def _filled(
     vague = 2.0  # pixels to which looks tell a place
     if seed is None and bound < vague:
         return found
-    n, k = len(found.pixels), film.factor
+    n, k = len(found.pixels), film.frames.factor
     pixels, confidence = found.pixels.copy(), found.confidence.copy()
     alike = carry(film.motion.maps[:n], k * looks.box[:, :2] + (k - 1) / 2)
     side = k * np.sqrt(looks.box[:, 2:].prod(axis=1))
