@@ -6,7 +6,6 @@ import pytest
 from helpers import one_a_frame
 
 from vidsindy_lite import write_video
-from vidsindy_lite.vision.background import shadowed
 from vidsindy_lite.vision.candidates import (
     TOLD,
     Appearance,
@@ -17,6 +16,7 @@ from vidsindy_lite.vision.candidates import (
     followed,
     plainest_paths,
 )
+from vidsindy_lite.vision.plate import shadowed
 from vidsindy_lite.vision.video import Reel
 
 
@@ -28,12 +28,11 @@ def found_in(*parts, colour=(20, 40, 220), behind=(90, 100, 110), level=1.0):
     for left, top, width, height, strong in parts:
         place = np.s_[top : top + height, left : left + width]
         strength[place], frame[place] = strong, colour
-    return Candidates.of(7, np.eye(3), components(strength, level, frame, ground))
+    return components(strength, level, frame, ground)
 
 
 def test_a_thing_is_where_it_differs():
     one = found_in((10, 20, 4, 4, 2.0))
-    np.testing.assert_array_equal(one.frame, [7])
     np.testing.assert_array_equal(one.box, [[10, 20, 4, 4]])
     np.testing.assert_allclose(one.centre, [[11.5, 21.5]])
     np.testing.assert_array_equal(one.colour, [[20, 40, 220]])
@@ -159,9 +158,8 @@ def test_it_is_followed_both_ways_from_where_it_is_known(tmp_path):
     frames = Reel(write_video(tmp_path / "film.mov", iter(film)))
     maps = np.tile(np.eye(3), (N, 1, 1))
     two = np.array([*PLACES[5:6], [20.0, 20]])  # the target and a piece of ground
-    found = Candidates.of(5, np.eye(3), np.column_stack(
-        [two, two - 8, np.full((2, 2), 17.0), np.full(2, 200.0), np.zeros((2, 6)), np.ones(2)]
-    ))  # fmt: skip
+    box, black = np.hstack([two - 8, np.full((2, 2), 17.0)]), np.zeros((2, 3))
+    found = Candidates(np.full(2, 5), two, two, box, np.full(2, 200.0), black, black, np.ones(2))
     looks = followed(frames, maps, found, Spot(10, PLACES[10], np.array([17.0, 17])), np.zeros(2))
     shown = ~np.isin(np.arange(N), hidden)
     assert np.linalg.norm(looks.box[shown, :2] - PLACES[shown], axis=1).max() < 1.5

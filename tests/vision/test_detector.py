@@ -56,8 +56,6 @@ def test_predictions_that_agree_are_averaged_and_the_surest_comes_first():
     ).T
     assert [d.centre[0] for d in detections(predictions)] == [100, 300]
     assert [d.centre[0] for d in detections(predictions, most=1)] == [100]
-    assert [d.centre[0] for d in detections(predictions, least=0.3)] == [100, 300, 200]
-    assert detections(predictions, least=0.81) == []
     assert detections(np.empty((5, 0))) == []
 
 

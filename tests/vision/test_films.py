@@ -14,7 +14,7 @@ from vidsindy_lite import Hint, track, write_video
 from vidsindy_lite.vision import Track, load_hints
 from vidsindy_lite.vision.camera import CameraMotion, at_rest
 from vidsindy_lite.vision.candidates import Candidates
-from vidsindy_lite.vision.moving import expected, finished, unsure
+from vidsindy_lite.vision.film import expected, finished, unsure
 from vidsindy_lite.vision.refining import View, roughness
 from vidsindy_lite.vision.rendering import BACKGROUNDS
 
@@ -330,7 +330,8 @@ def followed_to(n=30, factor=1, maps=None):
     seen = Candidates(at, centre, centre, box, np.full(m, 64.0), colour, 0 * colour,
                       np.full(m, 0.9))  # fmt: skip
     maps = np.tile(np.eye(3), (n, 1, 1)) if maps is None else maps
-    return expected(seen, np.arange(m), SimpleNamespace(maps=maps, factor=factor), n)
+    film = SimpleNamespace(maps=maps, frames=SimpleNamespace(factor=factor))
+    return expected(seen, np.arange(m), film, n)
 
 
 def test_a_target_is_expected_on_its_way_between_its_sightings_and_three_frames_beyond():

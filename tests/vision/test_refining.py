@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.background import Plate
+from vidsindy_lite.vision.plate import Plate
 from vidsindy_lite.vision.refining import Lens, View, entire, fitting, scatter
 
 GROUND = np.full((60, 80, 3), (60, 90, 120), np.uint8)
@@ -13,7 +13,7 @@ def look(frame, box, colour, centre=None, ground=GROUND):
     """What a lens sees near a box before the ground."""
     box = np.array(box, float)
     centre = box[:2] + (box[2:] - 1) / 2 if centre is None else np.array(centre, float)
-    plate = Plate(np.stack([ground] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
+    plate = Plate([ground] * 3, np.stack([np.eye(3)] * 3))
     return Lens(plate, 0.0).look(
         frame, np.eye(3), box, centre, np.array(colour, float), np.ones(3, np.float32)
     )

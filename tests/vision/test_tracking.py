@@ -102,6 +102,16 @@ def test_a_target_that_stays_for_long_leaves_no_ghost(tmp_path):
     assert np.nanmax(error) < 0.1
 
 
+@pytest.mark.parametrize(("shown", "pace"), [(range(12, 50), 1.0), (range(22, 39), 3.0)])
+def test_what_is_in_few_of_the_sampled_frames_leaves_no_hole_in_the_ground(tmp_path, shown, pace):
+    truth = np.full((400, 2), np.nan)
+    truth[shown] = [60, 90] + np.outer(np.arange(len(shown)), [pace, 0.0])
+    scene = Scene("bricks", size=24, image_size=SIZE)
+    found = track(render_video(tmp_path / "clip.mov", truth, scene, seed=1)).pixels
+    assert np.isnan(found[np.isnan(truth)]).all()
+    assert np.nanmax(np.abs(found - truth), initial=0) < 0.1
+
+
 def circle(radius, n=150):
     angle = np.linspace(0, 20, n)
     return [120, 90] + radius * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -200,27 +210,25 @@ def seen(u, confidence=0.9):
     return Detection(np.array([u, 50.0]), np.array([20.0, 20.0]), confidence)
 
 
-def places(chain):
-    return [None if d is None else float(d.centre[0]) for d in chain]
-
-
 def test_a_chain_leaves_out_what_does_not_belong():
     motion = [seen(100 + 5 * i) for i in range(20)]
     sightings = [[d] for d in motion]
     sightings[5].insert(0, seen(400, 0.99))  # surer than the target, once
     sightings[9] = [seen(400, 0.99)]  # instead of it
     sightings[14] = []
-    expected = places(motion)
-    expected[9] = expected[14] = None
-    assert places(link(sightings)) == expected
+    expected = 100 + 5.0 * np.arange(20)
+    expected[[9, 14]] = np.nan
+    np.testing.assert_array_equal(link(sightings)[0][:, 0], expected)
 
 
 def test_a_chain_takes_the_target_up_again():
     motion = [[seen(100 + 5.0 * i)] for i in range(20)] + [[]] * 40
     motion += [[seen(700 - 5.0 * i)] for i in range(20)]
-    assert places(link(motion)) == [places(m)[0] if m else None for m in motion]
-    assert link([]) == []
-    assert link([[], []]) == [None, None]
+    pixels, confidence = link(motion)
+    np.testing.assert_array_equal(pixels, [m[0].centre if m else [np.nan] * 2 for m in motion])
+    np.testing.assert_array_equal(confidence, [0.9 if m else 0 for m in motion])
+    assert len(link([])[0]) == 0
+    assert np.isnan(link([[], []])[0]).all()
 
 
 FRAMES, BALL = 160, 16.0

@@ -5,9 +5,8 @@
   video       reading and writing of video files, and of films that are folders of images
   track_files tracks as text files: DLTdv's, Tracker's, DeepLabCut's and ours
   tracking    track: a video in, the target's pixels out, by
-  background      what differs from a background at rest (the most exact)
-  moving          what moves most plainly, if camera and background are not: camera takes out the
-                  camera's motion, candidates are what differs from the ground or from other
+  film            what moves most plainly: camera takes out the camera's motion, if it moves, plate
+                  is the ground behind the target, candidates are what differs from it or from other
                   frames, and the best path through them, which learns the looks of what is on it,
                   or of what a hint points at; refining measures; track_targets follows several
   a detector      what looks like a target in a single frame: our network, or any YOLO-v8
@@ -16,7 +15,7 @@
 """
 
 from .candidates import Hint, load_hints
-from .moving import Track, track_targets
+from .film import Track, track_targets
 from .rendering import BACKGROUNDS, SHAPES, Scene, render, render_labelled, render_restless
 from .rendering import render_video
 from .track_files import TrackFile, read_tracks

@@ -21,7 +21,7 @@ own is in few of these: so a motion is taken only if it explains the frames bett
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -30,7 +30,7 @@ import cv2
 import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import Plate, carry, changes, lengths, light
+from .plate import Plate, carry, changes, lengths, light
 from .video import Reel
 
 _BEYOND = -1e6  # in place of grey levels where nothing is shown: what it has a part in is below 0
@@ -42,27 +42,6 @@ _VAGUE = 3.0  # reduced pixels: a map that is known no better is not known
 PLAINLY = 10.0  # standard errors of a displacement that is one
 _MANY = 60  # corners that need no other witness
 _AGREE = 0.25  # share of the corners that must do so: of those of mere noise, 0.15 to 0.24 agree
-
-
-class Ground(NamedTuple):
-    """One level of a view on which others are laid.
-
-    Its grey levels, by what each pixel changes with shift, turn, scale and light, (6, h, w), and
-    how much each may tell.
-    """
-
-    grey: Floats32
-    slopes: Floats32
-    share: Floats32
-
-    @classmethod
-    def of(cls, grey: Floats32) -> Ground:
-        slopes = _slopes(grey)
-        power = _by_blocks(slopes[0] ** 2 + slopes[1] ** 2)
-        # Times what a usual block tells, that one block may tell at most.
-        fair = np.minimum(1, 4.0 * np.median(power) / np.maximum(power, 1e-9))
-        share = cv2.resize(fair, grey.shape[::-1], interpolation=cv2.INTER_LINEAR)
-        return cls(grey, slopes, np.asarray(share, np.float32))
 
 
 class Aligned(NamedTuple):
@@ -88,9 +67,9 @@ class Look:
         return [np.asarray(cv2.GaussianBlur(one, (0, 0), 1), np.float32) for one in levels[1:]]
 
     @cached_property
-    def grounds(self) -> list[Ground]:
-        """These, as others are laid on them."""
-        return [Ground.of(grey) for grey in self.levels]
+    def slopes(self) -> list[Floats32]:
+        """By what each pixel of these changes, see `_slopes`."""
+        return [_slopes(grey) for grey in self.levels]
 
     @cached_property
     def relief(self) -> Image:
@@ -131,29 +110,22 @@ class Look:
         return self.corners[good], ends[good]
 
 
-def align(before: list[Ground], after: list[Floats32], guess: Floats) -> Aligned | None:
+def align(before: Look, after: Look, guess: Floats) -> Aligned | None:
     """The map of one view to another, from a guess; None where they have little in common.
 
     Its error is infinite where the views tell no more than the guess.
-
-    Parameters
-    ----------
-    before : list of Ground
-    after : list of ndarray
-        The `levels` of a `Look`.
-    guess : ndarray, shape (3, 3)
-        In pixels of the images of which these are levels.
     """
-    if not before:  # images too small for a pyramid
+    if not before.levels:  # images too small for a pyramid
         return None
-    size = 2 * np.array(before[0].grey.shape[::-1])
+    size = 2 * np.array(before.levels[0].shape[::-1])
     found = Aligned(_as_similarity(guess, size), np.inf)
-    for level in range(len(before), 0, -1):
+    for level in range(len(before.levels), 0, -1):
         scale, back = (np.diag([x, x, 1.0]) for x in (0.5**level, 2.0**level))
         here = scale @ found.map @ back
         # Grey levels from which on a pixel is left aside.
         loose = 40.0 if level > 1 else 0.0
-        fitted = _fit(before[level - 1], after[level - 1], here, scale[0, 0], loose)
+        both = before.slopes[level - 1], after.levels[level - 1]
+        fitted = _fit(*both, here, scale[0, 0], loose)
         if fitted is None:
             return None
         found = Aligned(back @ fitted.map @ scale, 2 * fitted.error)
@@ -174,11 +146,15 @@ def _as_similarity(guess: Floats, size: Ints) -> Floats:
 
 
 def _fit(
-    ground: Ground, view: Floats32, here: Floats, scale: float, loose: float
+    slopes: Floats32, view: Floats32, here: Floats, scale: float, loose: float
 ) -> Aligned | None:
     """One level: Gauss-Newton steps of which each refines the map by what the key's slopes say."""
-    key, slopes, share = ground
+    key = slopes[4]
     height, width = key.shape
+    power = _by_blocks(slopes[0] ** 2 + slopes[1] ** 2)
+    # Times what a usual block tells, that one block may tell at most.
+    fair = np.minimum(1, 4.0 * np.median(power) / np.maximum(power, 1e-9))
+    share = cv2.resize(fair, (width, height), interpolation=cv2.INTER_LINEAR)
     middle = np.array([[1, 0, (width - 1) / 2], [0, 1, (height - 1) / 2], [0, 0, 1.0]])
     to_middle = np.linalg.inv(middle)
     steep = slopes.reshape(6, -1)
@@ -273,12 +249,6 @@ class CameraMotion(NamedTuple):
     maps: Floats
     errors: Floats
 
-    @classmethod
-    def of(cls, maps: Floats, errors: Floats, factor: int) -> CameraMotion:
-        """By maps of frames that are reduced by a factor, and errors in their pixels."""
-        larger = rescaled(maps, 1 / factor)
-        return cls(larger / larger[:, 2:, 2:], factor * errors)
-
     @property
     def moves(self) -> bool:
         """Does the camera move at all?"""
@@ -293,7 +263,8 @@ def at_rest(n: int) -> CameraMotion:
 def rescaled(maps: Floats, factor: float) -> Floats:
     """Maps (n, 3, 3) of pixels of an image as maps of those of the image reduced by a factor."""
     larger = np.array([[factor, 0, (factor - 1) / 2], [0, factor, (factor - 1) / 2], [0, 0, 1]])
-    return np.asarray(np.linalg.inv(larger) @ maps @ larger, float)
+    found = np.linalg.inv(larger) @ maps @ larger
+    return np.asarray(found / found[:, 2:, 2:], float)
 
 
 def stands_still(samples: Iterable[Image]) -> bool | None:
@@ -331,7 +302,7 @@ def _moved(before: Look, after: Look) -> bool | None:
 
 def _drifted(before: Look, after: Look) -> bool | None:
     """Do all pixels tell of a motion, where corners are few? None if these are mute, too."""
-    found = align(before.grounds, after.levels, np.eye(3))
+    found = align(before, after, np.eye(3))
     if found is None or found.error > _VAGUE:
         return None
     moved = displacement(found.map[None], before.grey.shape[::-1])[0]
@@ -389,7 +360,7 @@ class _Key(NamedTuple):
         told, alone = _by_corners(self.look, look, last)
         if alone:
             return told
-        direct = align(self.look.grounds, look.levels, last)
+        direct = align(self.look, look, last)
         both = [one for one in (told, direct) if one is not None and one.error < _VAGUE]
         best = min((one.error for one in both), default=0.0)
         # Times the error of another map that is about as good; then the smaller step is taken.
@@ -432,21 +403,19 @@ def steadied(frames: Iterable[Image], factor: int) -> CameraMotion:
         # error to all that follow, so late: a little above the 0.3 that `align` needs.
         if key.shared(last) < 0.4:
             key, last = before, np.eye(3)
-    return CameraMotion.of(np.array(maps), np.array(errors), factor)
+    return CameraMotion(rescaled(np.array(maps), 1 / factor), factor * np.array(errors))
 
 
-def explains(samples: Image, maps: Floats, known: Bools) -> bool:
+def explains(samples: Image, maps: Floats) -> bool:
     """Are reduced frames likelier with a camera that moves by these maps than with one at rest?
 
     Frames count by how far they are from the usual one: where that is the same, so are both plates.
     """
     rest = np.broadcast_to(np.eye(3), maps.shape)
-    samples, maps, rest = samples[known], maps[known], rest[known]
     size = samples.shape[2:0:-1]
     apart = np.array([displacement(np.linalg.inv(usual) @ maps, size) for usual in maps])
     weights = apart[apart.sum(axis=1).argmin()]
-    all_known = np.ones(len(maps), bool)
-    moved, rested = (_missed(samples, Plate(samples, at, all_known), at) for at in (maps, rest))
+    moved, rested = (_missed(samples, Plate(samples, at), at) for at in (maps, rest))
     gains = [_gain(*both) for both in zip(moved, rested, strict=True)]
     # Of a gain: the noise of a median of 21 frames adds that, and maps smooth it.
     return bool(weights @ gains > 0.04 * weights.sum())
@@ -459,7 +428,7 @@ def rests(samples: Image) -> bool:
     axis only.
     """
     rest = np.broadcast_to(np.eye(3), (len(samples), 3, 3))
-    plate = Plate(samples, rest, np.ones(len(samples), bool))
+    plate = Plate(samples, rest)
     here, *beside = (
         _missed(samples, plate, rest + np.array([[0, 0, u], [0, 0, v], [0, 0, 0]]))
         for u, v in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
@@ -470,24 +439,22 @@ def rests(samples: Image) -> bool:
     return bool(np.mean(np.array(least) > 0) >= 0.9)
 
 
-def _missed(samples: Image, plate: Plate, maps: Floats) -> list[Floats32]:
-    """What each sample misses of a plate that lies in it by these maps, see `_misses`."""
-    return [_misses(one, *plate.seen_from(at)) for one, at in zip(samples, maps, strict=True)]
+def _missed(samples: Image, plate: Plate, maps: Floats) -> Iterator[Floats32]:
+    """Grey levels by which the parts (12, 12) of each sample differ from the plate, NaN if unknown.
 
-
-def _misses(frame: Image, ground: Image, known: Bools) -> Floats32:
-    """Grey levels by which the parts (12, 12) of a frame differ from the ground; NaN if unknown."""
-    change = changes(frame, ground, light(frame, ground, known))
-    # Reduced pixels: noise is not what frames are compared by.
-    smooth = cv2.GaussianBlur(change, (0, 0), 2.0)
-    # Grey levels that a pixel can differ by: a few that differ by more say no more.
-    apart = np.minimum(lengths(np.asarray(smooth, np.float32)), 20.0)
-    # Around what is not known smoothing is wrong.
-    use = cv2.erode(known.astype(np.uint8), np.ones((9, 9))).astype(np.float32)
-    parts, share = (
-        cv2.resize(x, (PARTS, PARTS), interpolation=cv2.INTER_AREA) for x in (apart * use, use)
-    )
-    return np.where(share > 0.5, parts / np.maximum(share, 0.5), np.nan).astype(np.float32)
+    By these maps the samples lie in it.
+    """
+    for sample, here in zip(samples, maps, strict=True):
+        ground, known = plate.seen_from(here)
+        change = changes(sample, ground, light(sample, ground, known))
+        # Reduced pixels: noise is not what frames are compared by.
+        smooth = cv2.GaussianBlur(change, (0, 0), 2.0)
+        # Grey levels that a pixel can differ by: a few that differ by more say no more.
+        apart = np.minimum(lengths(np.asarray(smooth, np.float32)), 20.0)
+        # Around what is not known smoothing is wrong.
+        use = cv2.erode(known.astype(np.uint8), np.ones((9, 9))).astype(np.float32)
+        parts, share = _by_blocks(apart * use), _by_blocks(use)
+        yield np.where(share > 0.5, parts / np.maximum(share, 0.5), np.nan).astype(np.float32)
 
 
 def _gain(one: Floats32, other: Floats32) -> float:
@@ -517,11 +484,9 @@ def camera_motion(
     motion = _followed(frames, small, sampled) if still is False else None
     if motion is not None:
         return motion, ()
-    doubts: tuple[str, ...] = ()
-    if not still and not rests(small):
-        doubts = ("the background is too plain to tell whether the camera moves: if so, its "
-                  "motion is part of the track",)  # fmt: skip
-    return at_rest(frames.info.frames), doubts
+    plain = ("the background is too plain to tell whether the camera moves: if so, its motion is "
+             "part of the track")  # fmt: skip
+    return at_rest(frames.info.frames), () if still or rests(small) else (plain,)
 
 
 def _followed(frames: Reel, small: Image, sampled: Ints) -> CameraMotion | None:
@@ -538,4 +503,5 @@ def _followed(frames: Reel, small: Image, sampled: Ints) -> CameraMotion | None:
         return None
     at = np.minimum(sampled, len(motion.maps) - 1)
     known = np.isfinite(motion.errors[at])
-    return motion if explains(small, rescaled(motion.maps[at], frames.factor), known) else None
+    maps = rescaled(motion.maps[at[known]], frames.factor)
+    return motion if explains(small[known], maps) else None

@@ -7,7 +7,7 @@ three levels: a target that touches its shadow, or a faint change of the light, 
 thing at a low level and stands alone at a higher one. What is connected is a candidate; which of
 them are the target is for the association to say.
 
-All of this happens on reduced frames, see `background`. What a user knows of the target is a hint:
+All of this happens on reduced frames, to be quick. What a user knows of the target is a hint:
 a box around it in one frame, or its colour.
 
 A path gains the quality of its candidates and pays for leaving its motion, of constant velocity or
@@ -25,7 +25,7 @@ time near where its motion leads and near the candidates there.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from itertools import chain, islice, repeat, tee
 from typing import Any, NamedTuple, Self
@@ -35,9 +35,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from ..checks import check_integer, check_number, shown
+from ..checks import check_integer, check_vector, shown
 from ..storage import check_file, read_tree
-from .background import Plate, carry, changes, least_difference, lengths, light, shadowed, tolerance
+from .plate import Plate, carry, changes, least_difference, lengths, light, shadowed, tolerance
 from .video import Reel
 
 _KEPT = 16  # candidates of a frame
@@ -86,14 +86,14 @@ class Hint:
             )
         if self.box is None and self.colour is None:
             raise ValueError("target: must be a frame and a box in it, or a colour, got neither")
-        if self.frame is not None:
+        if self.frame is not None and self.box is not None:
             object.__setattr__(self, "frame", check_integer("frame", self.frame))
-            box = _numbers("box", self.box, 4, "(u, v, width, height) in pixels")
+            box = tuple(check_vector("box", self.box, 4).tolist())
             if min(box[2:]) < 2:
                 raise ValueError(f"box: must be two pixels wide and high or more, got {box}")
             object.__setattr__(self, "box", box)
         if self.colour is not None:
-            colour = _numbers("colour", self.colour, 3, "(red, green, blue), 0 to 255 each")
+            colour = tuple(check_vector("colour", self.colour, 3).tolist())
             if not 0 <= min(colour) <= max(colour) <= 255:
                 raise ValueError(f"colour: must be red, green, blue, 0 to 255 each, got {colour}")
             object.__setattr__(self, "colour", colour)
@@ -150,12 +150,6 @@ def _alike(colours: Floats, told: Floats) -> Floats:
     return np.asarray(np.exp(-((off**2).sum(axis=1) / 70.0**2)))
 
 
-def _numbers(name: str, values: object, count: int, what: str) -> tuple[float, ...]:
-    if not isinstance(values, Sequence) or isinstance(values, str) or len(values) != count:
-        raise ValueError(f"{name}: must be {what}, got {shown(values)}")
-    return tuple(check_number(name, value) for value in values)
-
-
 def load_hints(path: str | os.PathLike) -> tuple[Hint | None, ...]:
     """The hints of a rig file, one per camera: ``target = {frame = 10, box = [u, v, w, h]}``.
 
@@ -176,22 +170,16 @@ def load_hints(path: str | os.PathLike) -> tuple[Hint | None, ...]:
     tables = read_tree("path", check_file("path", path), ".toml").get("camera", ())
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         raise ValueError(f"path: must hold tables [[camera]], got {shown(tables)}, in '{path}'")
-    return tuple(_from_table(f"{path}: camera {i}", table) for i, table in enumerate(tables))
-
-
-def _from_table(where: str, table: Mapping[str, object]) -> Hint | None:
-    told = table.get("target")
-    if told is None:
-        return None
+    hints: list[Hint | None] = []
     known = [field.name for field in fields(Hint)]
-    if not isinstance(told, dict) or not set(told) <= set(known):
-        raise ValueError(
-            f"{where}: target: must be a table of {', '.join(known)}, got {shown(told)}"
-        )
-    try:
-        return Hint(**told)
-    except ValueError as error:
-        raise ValueError(f"{where}: target: {error}") from None
+    for i, told in enumerate(table.get("target") for table in tables):
+        try:
+            if told is not None and not (isinstance(told, dict) and set(told) <= set(known)):
+                raise ValueError(f"must be a table of {', '.join(known)}, got {shown(told)}")
+            hints.append(None if told is None else Hint(**told))
+        except ValueError as error:
+            raise ValueError(f"{path}: camera {i}: target: {error}") from None
+    return tuple(hints)
 
 
 class Candidates(NamedTuple):
@@ -227,17 +215,9 @@ class Candidates(NamedTuple):
         whole = cls(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
         return whole.only(np.argsort(whole.frame, kind="stable"))
 
-    @classmethod
-    def of(cls, frame: int | Ints, here: Floats, rows: Floats) -> Candidates:
-        """Of a frame, or one a row: rows (k, 14) of centre, box, area, colour, behind, quality."""
-        number = np.full(len(rows), frame)
-        centre, box, area, colour, behind = np.split(rows[:, :13], [2, 6, 7, 10], axis=1)
-        return cls(number, carry(here, centre), centre, box, area[:, 0], colour, behind,
-                   rows[:, 13])  # fmt: skip
-
 
 def candidates(
-    frames: Iterable[Image], maps: Floats, plate: Plate, noise: float
+    frames: Iterable[Image], maps: Floats, plate: Plate, noise: float, targets: int
 ) -> tuple[Candidates, list[Floats32]]:
     """The candidates of all frames, and how much brighter each frame is than the ground."""
     lights, found = [], []
@@ -245,21 +225,21 @@ def candidates(
     bound[plate.valid == 0] = 1e3
     for i, (frame, here, others) in enumerate(_with_neighbours(frames, maps)):
         ground, known = plate.seen_from(here)
-        allowed = plate.laid(bound, here)
+        allowed = plate.laid(bound, here, borderValue=1e3)
         lit = light(frame, ground, known)
         lights.append(lit)
         differs = lengths(changes(frame, ground, lit))
         witnesses = [(differs / allowed * known, 1.0)]
         if others:
             witnesses.append((_from_neighbours(frame, others, plate.moves) / allowed, 0.7))
-        rows = [
+        one = _distinct(Candidates.joined(
             components(strength, level, frame, ground, worth)
             for strength, worth in witnesses
             for level in (1.0, 2.5, 6.0)  # tolerances by which what is connected differs
-        ]
-        found.append(Candidates.of(i, here, _distinct(np.concatenate(rows))))
-        found[-1].colour[:] /= lit
-    return Candidates.joined(found), lights
+        ))  # fmt: skip
+        found.append(one._replace(frame=one.frame + i, place=carry(here, one.centre),
+                                  colour=one.colour / lit))  # fmt: skip
+    return _uncommon(Candidates.joined(found), targets), lights
 
 
 def _with_neighbours(
@@ -292,8 +272,8 @@ def _from_neighbours(frame: Image, others: list[tuple[Image, Floats]], moves: bo
 
 def components(
     strength: Floats32, level: float, frame: Image, ground: Image, worth: float = 1.0
-) -> Floats:
-    """What differs by some level and is connected, as rows (k, 14), see `Candidates.of`.
+) -> Candidates:
+    """What differs by some level and is connected, in a frame that counts as the first one.
 
     A thing is plain if it differs by much, fills its box, is of more than a few pixels and lies
     clear of the border. A shadow, the same surface in less light, is half as plain.
@@ -301,9 +281,7 @@ def components(
     mask = cv2.morphologyEx((strength > level).astype(np.uint8), cv2.MORPH_CLOSE,
                             np.ones((3, 3), np.uint8))  # fmt: skip
     left, top, wide, high = cv2.boundingRect(mask)
-    place = np.s_[top : top + high, left : left + wide]
-    if not wide:
-        return np.zeros((0, 14))
+    place = np.s_[top : top + max(high, 1), left : left + max(wide, 1)]
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask[place])
     area = stats[:, cv2.CC_STAT_AREA].astype(float)
     order = 1 + np.argsort(-area[1:])[:_KEPT]  # the largest: the others are noise
@@ -327,7 +305,8 @@ def components(
     quality *= np.minimum(area / 8, 1)
     cut = (box[:, :2] <= 0).any(axis=1) | (box[:, :2] + box[:, 2:] >= mask.shape[::-1]).any(axis=1)
     quality *= np.where(cut, 0.6, 1) * np.where(shadowed(colour, behind, 0.1), 0.5, 1)
-    return np.column_stack([centre, box, area, colour, behind, quality])
+    first = np.zeros(len(order), int)
+    return Candidates(first, centre, centre, box, area, colour, behind, quality)
 
 
 def _means(colours: Image, part: Ints, count: int) -> Floats:
@@ -336,21 +315,21 @@ def _means(colours: Image, part: Ints, count: int) -> Floats:
     return sums / np.maximum(np.bincount(part, minlength=count), 1)[:, None]
 
 
-def _distinct(rows: Floats) -> Floats:
-    """The plainest of the rows, each thing once, though it shows at several levels."""
-    rows = rows[np.argsort(-rows[:, 13], kind="stable")]
-    apart = np.linalg.norm(rows[:, None, :2] - rows[:, :2], axis=2)
-    same = np.tril((apart < 1) & (np.abs(np.log(rows[:, None, 6] / rows[:, 6])) < 0.22), -1)
+def _distinct(found: Candidates) -> Candidates:
+    """The plainest candidates of a frame, each thing once, though it shows at several levels."""
+    found = found.only(np.argsort(-found.quality, kind="stable"))
+    apart = np.linalg.norm(found.centre[:, None] - found.centre, axis=2)
+    same = np.tril((apart < 1) & (np.abs(np.log(found.area[:, None] / found.area)) < 0.22), -1)
     kept: list[int] = []
-    for k in range(len(rows)):
+    for k in range(len(same)):
         if not same[k, kept].any():
             kept.append(k)
         if len(kept) == _KEPT:
             break
-    return rows[kept]
+    return found.only(np.array(kept, int))
 
 
-def uncommon(found: Candidates, targets: int) -> Candidates:
+def _uncommon(found: Candidates, targets: int) -> Candidates:
     """Candidates worth the less the more of them look alike in their frame than there are targets.
 
     The leaves of a tree hardly leave their places, and before a plain wall that does not tell the

@@ -21,7 +21,7 @@ than those by which the path scatters.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -30,7 +30,7 @@ from scipy.ndimage import maximum_filter1d, median_filter
 from scipy.spatial.distance import cdist
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import Plate, dot, hull, least_difference, lengths, relit, shadowed, tolerance
+from .plate import Plate, dot, least_difference, lengths, relit, shadowed, tolerance
 
 _UNEVEN = 0.12  # share by which a shadow may darken the colours of a pixel unlike each other
 _WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
@@ -103,21 +103,20 @@ class Lens:
         dark = shadowed(ground + smooth, ground, _UNEVEN)
         own &= ~dark | shadowed(ground + np.float32(0.5) * contrast, ground, _UNEVEN)
         label = _nearest(own, centre - low)
-        part = label is not None
+        view = label if label is None else self._measure(label, change, contrast, low, now)
         if label is None and (label := _nearest(mask, centre - low)) is None:
             return None
-        view = self._measure(label, change, contrast, low, now)
         found = whole(label, mask, mask & (off | (share < 0)), now, ground)
         if found is None:
-            return view if part else None
+            return view
         label, colours, plain = found
         if plain:
-            return replace(view, whole=view) if part else None
+            return view and replace(view, whole=view)
         first, end = _extent(label, low)
         if (((first == low) & (low > 0)) | ((end == high) & (high < self.plate.size))).any():
-            return view if part else None  # how far it goes, the window does not show
+            return view  # how far it goes, the window does not show
         all_ = self._measure(label, change, colours - ground, low, now)
-        return replace(view if part else replace(all_, area=0.0), whole=all_)
+        return replace(view or replace(all_, area=0.0), whole=all_)
 
     def _measure(
         self, label: Bools, change: Floats32, contrast: Floats32, low: Floats, now: Floats32
@@ -130,31 +129,28 @@ class Lens:
         alpha = np.clip(alpha, 0, 1)
         alpha[core] = 1
         alpha[~near] = 0
-        alpha = alpha.astype(float)
-        area = float(alpha.sum())
-        u, v = np.arange(alpha.shape[1]), np.arange(alpha.shape[0])
-        centroid = np.array([alpha.sum(axis=0) @ u, alpha.sum(axis=1) @ v]) / max(area, 1e-9)
+        moments = cv2.moments(alpha.astype(float))
+        area = moments["m00"]
+        centroid = np.array([moments["m10"], moments["m01"]]) / max(area, 1e-9)
         first, end = _extent(label, low)
         inside = bool((first > 0).all() and (end < self.plate.size).all())
         # Share of the ground around it that does not show where it ends.
         blind = (square[near & ~label] < self.least**2).mean() > 0.1
-        beside = u - centroid[0], v - centroid[1]
-        skewness = np.full(2, np.nan) if blind else _skewness(alpha, *beside)
+        skewness = np.full(2, np.nan) if blind else _skewness(moments)
         shade = now[core if core.any() else label].mean(axis=0)
         return View(low + centroid, area, shade, inside, skewness)
 
 
-def _skewness(alpha: Floats, u: Floats, v: Floats) -> Floats:
+def _skewness(moments: Mapping[str, float]) -> Floats:
     """How lopsided a coverage is about its centroid: two numbers that no turn or size changes.
 
     With z = u + iv from the centroid a turn changes only the phase of the complex moments
     c_pq = sum of alpha z^p conj(z)^q. Of third order, these are magnitudes of c_21 and c_30.
     """
-    m = np.vander(v, 4, increasing=True).T @ alpha @ np.vander(u, 4, increasing=True)
-    c21 = m[0, 3] + m[2, 1] + 1j * (m[1, 2] + m[3, 0])
-    c30 = m[0, 3] - 3 * m[2, 1] + 1j * (3 * m[1, 2] - m[3, 0])
+    uuu, uuv, uvv, vvv = (moments[name] for name in ("mu30", "mu21", "mu12", "mu03"))
+    c21, c30 = uuu + uvv + 1j * (uuv + vvv), uuu - 3 * uvv + 1j * (3 * uuv - vvv)
     # By the second moment of a disc of that area, as a skewness is by that of a distribution.
-    return np.abs([c21, c30]) * (2 * np.pi) ** 1.5 / max(m[0, 0], 1e-9) ** 2.5
+    return np.abs([c21, c30]) * (2 * np.pi) ** 1.5 / max(moments["m00"], 1e-9) ** 2.5
 
 
 def _extent(label: Bools, low: Floats) -> tuple[Floats, Floats]:
@@ -223,8 +219,7 @@ def _usual_ones(views: Sequence[View | None]) -> list[View | None]:
     off = np.abs(np.log(np.maximum(areas, 1e-3) / usual[:, None]))
     # Areas of whole views scatter by less.
     better = off[:, 1] < np.minimum(off[:, 0], np.log(1.15))
-    best = [replace(one.whole, whole=one.whole) if one and one.whole and fits else one
-            for one, fits in zip(views, better, strict=True)]  # fmt: skip
+    best = [one.whole if one and fits else one for one, fits in zip(views, better, strict=True)]
     return [one if one and one.area > 0 else None for one in best]
 
 
@@ -279,7 +274,7 @@ def fitting(
     off, bound = displaced(frames, places, areas, skewness, inside)
     good = off < bound
     while (use := np.flatnonzero(good)).size >= 7:
-        miss, unsure = _left_out(frames, places, use)
+        miss, unsure = _left_out(frames[use], places[use])
         # Of its size, by which a view may be off the way.
         room = np.maximum(10 * max(float(np.median(miss)), 0.05), 1 + 0.3 * np.sqrt(areas[use]))
         over = miss / (room + unsure)
@@ -306,25 +301,24 @@ def swapped(frames: Ints, areas: Floats) -> int | None:
     return None
 
 
-def _left_out(frames: Ints, places: Floats, known: Ints) -> tuple[Floats, Floats]:
+def _left_out(frames: Ints, places: Floats) -> tuple[Floats, Floats]:
     """How far places are from where the three on both sides say, and how unsure that is: (m,) each.
 
-    Of those that are `known`, five or more. A quartic through six says it. Where a target turns
-    within a few frames, or some are missing, no polynomial is right, and a parabola says something
-    else.
+    Of five or more. A quartic through six says it. Where a target turns within a few frames, or
+    some are missing, no polynomial is right, and a parabola says something else.
     """
-    m, count = len(known), min(6, len(known) - 1)
+    m, count = len(frames), min(6, len(frames) - 1)
     own = np.arange(m)[:, None]
     beside = np.clip(own - 3, 0, m - 1 - count) + np.arange(count)
     beside += beside >= own  # without itself
-    t = (frames[known][beside] - frames[known][:, None]).astype(float)
+    t = (frames[beside] - frames[:, None]).astype(float)
     quartic, parabola = (
         np.einsum("ij,ijk->ik", np.linalg.pinv(t[..., None] ** np.arange(degree + 1))[:, 0],
-                  places[known][beside])
+                  places[beside])
         for degree in (min(4, count - 1), 2)
     )  # fmt: skip
     first, last = t[:, 0], t[:, -1]
-    off = np.linalg.norm(quartic - places[known], axis=1)
+    off = np.linalg.norm(quartic - places, axis=1)
     unsure = np.linalg.norm(quartic - parabola, axis=1) * (1 + ((first > 0) | (last < 0)))
     far = np.maximum(last, 0) - np.minimum(first, 0) > 15
     return np.where(far, 0.0, off), np.where(far, np.inf, unsure)
@@ -339,7 +333,7 @@ def roughness(frames: Ints, places: Floats, areas: Floats) -> tuple[Floats, floa
     half, logs = np.sqrt(np.median(areas)) / 2, np.log(np.maximum(areas, 1))
     torn = half * scatter(frames, logs[:, None])
     odd = half * np.abs(logs - median_filter(logs, _AROUND, mode="nearest"))
-    off, unsure = _left_out(frames, places, np.arange(len(frames)))
+    off, unsure = _left_out(frames, places)
     worst = np.maximum(np.maximum(odd, off - unsure), torn if np.isfinite(torn) else 0.0)
     return np.hypot(scatter(frames, places), worst), torn
 
@@ -367,8 +361,10 @@ def whole(
     _, labels = cv2.connectedComponents(np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, _CORE)))
     inside = np.bincount(labels[own], minlength=2)
     label = labels == 1 + int(inside[1:].argmax()) if inside[1:].any() else own
-    core = cv2.erode(label.astype(np.uint8), _CORE) > 0
-    outline = cv2.fillConvexPoly(np.zeros(label.shape, np.uint8), hull(label), 1)
+    thing = label.astype(np.uint8)
+    core = cv2.erode(thing, _CORE) > 0
+    rims, _ = cv2.findContours(thing, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    outline = cv2.fillConvexPoly(np.zeros_like(thing), cv2.convexHull(np.concatenate(rims)), 1)
     if not core.any() or label.sum() < 0.85 * outline.sum():
         return None
     _, nearest = cv2.distanceTransformWithLabels(

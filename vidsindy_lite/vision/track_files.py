@@ -143,7 +143,9 @@ def read_tracks(path: str | os.PathLike, individual: str | None = None) -> list[
         elif text.lstrip().lower().startswith("#kinovea"):
             header, rows = _of_kinovea(text)
         else:
-            header, rows = _split(_cells(text))
+            cells = _cells(text)
+            start = next((i for i, row in enumerate(cells) if _is_of_numbers(row)), len(cells))
+            header, rows = cells[:start], cells[start:]
         if not rows:
             raise ValueError("must hold rows of numbers, got none")
         return _tracks(path.name, header, rows, individual)
@@ -241,12 +243,6 @@ def _of_kinovea(text: str) -> tuple[list[list[str]], list[list[str]]]:
 def _plain(cell: str) -> str:
     """The name of a column without its unit, if that is pixels."""
     return re.sub(r"\s*[(\[](px|pixels?)[)\]]$", "", cell.strip().lower())
-
-
-def _split(cells: list[list[str]]) -> tuple[list[list[str]], list[list[str]]]:
-    """Header and numbers."""
-    start = next((i for i, row in enumerate(cells) if _is_of_numbers(row)), len(cells))
-    return cells[:start], cells[start:]
 
 
 def _is_of_numbers(row: Sequence[str]) -> bool:
@@ -391,30 +387,30 @@ def _track(
         pixels -= 0.5
     frames = next((columns[key] for key in _FRAME if key in columns), None)
     clock = next((match for key in columns if (match := _TIME.fullmatch(key))), None)
-    if clock is None:
-        if frames is None:
-            return TrackFile(name, pixels, None, doubts, upwards=upwards)
+    t, start = None, 0
+    if clock is not None:
+        # Seconds in milli-, micro- or nanoseconds, by their first letter.
+        letter = (clock[1] or clock[2] or "s")[0]
+        t = {"m": 1e-3, "u": 1e-6, "µ": 1e-6, "n": 1e-9}.get(letter, 1.0) * columns[clock[0]]
+        if not np.isfinite(t).all() or (np.diff(t) <= 0).any():
+            raise ValueError(f"must have increasing times, got others as {clock[0]}")
+        # No camera takes longer from one frame to the next.
+        if len(t) > 1 and (step := np.median(np.diff(t))) > 2.0:
+            doubts += (
+                f"{name}: its times are {step:.4g} apart: if these are milliseconds, "
+                f"call the column {clock[0]}_ms",
+            )
+        t = _unrounded(t)
+    elif frames is not None:
         if not _counts(frames):
             raise ValueError(
                 "must have increasing whole numbers of frames within ten million, got "
                 + ", ".join(f"{frame:.10g}" for frame in frames[:4])
             )
-        whole = (frames - frames[0]).astype(int)
-        filled = np.full((whole[-1] + 1, 2), np.nan)
-        filled[whole] = pixels
-        return TrackFile(name, filled, None, doubts, int(frames[0]), upwards)
-    # Seconds in milli-, micro- or nanoseconds, by their first letter.
-    unit = {"m": 1e-3, "u": 1e-6, "µ": 1e-6, "n": 1e-9}.get((clock[1] or clock[2] or "s")[0], 1.0)
-    t = unit * columns[clock[0]]
-    if not np.isfinite(t).all() or (np.diff(t) <= 0).any():
-        raise ValueError(f"must have increasing times, got others as {clock[0]}")
-    # No camera takes longer from one frame to the next.
-    if len(t) > 1 and (step := np.median(np.diff(t))) > 2.0:
-        doubts += (
-            f"{name}: its times are {step:.4g} apart: if these are milliseconds, "
-            f"call the column {clock[0]}_ms",
-        )
-    return TrackFile(name, pixels, _unrounded(t), doubts, upwards=upwards)
+        start, seen = int(frames[0]), pixels
+        pixels = np.full((int(frames[-1]) - start + 1, 2), np.nan)
+        pixels[(frames - start).astype(int)] = seen
+    return TrackFile(name, pixels, t, doubts, start, upwards)
 
 
 def _seen(columns: Mapping[str, Floats]) -> Bools:

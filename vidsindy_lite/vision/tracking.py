@@ -1,6 +1,6 @@
 """Where the moving target is in each frame of a video file, to a fraction of a pixel.
 
-Two ways to find it stand behind one call. The film tracker (`moving`) knows all frames: it takes
+Two ways to find it stand behind one call. The film tracker (`film`) knows all frames: it takes
 out the camera's motion and the light's, and of all that differs from the ground it follows what
 moves most plainly: to a thousandth of a pixel in clean films of a camera at rest. A *detector*
 knows what targets look like and finds it in each frame on its own, whatever the background does, to
@@ -28,9 +28,10 @@ import cv2
 import numpy as np
 
 from ..arrays import Floats, Floats32, Image
-from ..checks import MALFORMED, check_instance, check_path, shown
+from ..checks import MALFORMED, check_instance, shown
+from ..storage import check_file
 from .candidates import Candidates, Hint, as_written, best_path
-from .moving import Track, follow
+from .film import Track, follow
 from .video import read_video, video_info
 
 DETECTORS = ("auto", "background", "learned")
@@ -88,7 +89,9 @@ def track(
     if detector in ("auto", "background"):
         found = follow(path, target, rests=detector == "background")
     else:
-        found = _link_detections(path, detector)
+        network = LearnedDetector() if detector == "learned" else OnnxDetector(detector)
+        chain = link([detections(network.predict(frame)) for frame in read_video(path)])
+        found = Track(*chain, str(detector))
     lacking, stated = found.warnings + _lost(found), video_info(path).frames
     if target is not None and target.colour is not None and np.isnan(found.pixels).all():
         lacking += (f"nothing was found of the colour {as_written(target.colour)} as told",)
@@ -123,18 +126,10 @@ def check_detector(name: str | os.PathLike) -> None:
             f"detector: must be one of {', '.join(DETECTORS)}, or the name of an .onnx file, "
             f"got {shown(name)}"
         )
-    if not Path(name).is_file():
-        raise FileNotFoundError(f"detector: no such file, got '{name}'")
+    check_file("detector", name)
 
 
-def _link_detections(path: str | os.PathLike, name: str | os.PathLike) -> Track:
-    detector = LearnedDetector() if name == "learned" else OnnxDetector(name)
-    chain = link([detections(detector.predict(frame)) for frame in read_video(path)])
-    pixels = np.array([d.centre if d else (np.nan, np.nan) for d in chain], float)
-    return Track(pixels, np.array([d.confidence if d else 0.0 for d in chain]), str(name))
-
-
-def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
+def link(sightings: Sequence[Sequence[Detection]]) -> tuple[Floats, Floats]:
     """At most one sighting of each frame, such that together they are one motion.
 
     They are candidates as good as the detector is sure of them, see `best_path`; a target may be
@@ -147,19 +142,21 @@ def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
 
     Returns
     -------
-    chain : list of Detection or None
-        One entry a frame.
+    pixels : ndarray, shape (n, 2)
+        Centre of the one of each frame, NaN where there is none.
+    confidence : ndarray, shape (n,)
     """
     flat = [(i, d) for i, seen in enumerate(sightings) for d in seen]
-    rows = np.zeros((len(flat), 14))
-    for row, (_, d) in zip(rows, flat, strict=True):
-        row[:7] = *d.centre, *(d.centre - d.size / 2), *d.size, d.size.prod()
-        row[13] = d.confidence
-    seen = Candidates.of(np.array([i for i, _ in flat], int), np.eye(3), rows)
-    chain: list[Detection | None] = [None] * len(sightings)
-    for row in best_path(seen, away=True).rows:
-        chain[flat[row][0]] = flat[row][1]
-    return chain
+    frame = np.array([i for i, _ in flat], int)
+    centre = np.array([d.centre for _, d in flat]).reshape(-1, 2)
+    size = np.array([d.size for _, d in flat]).reshape(-1, 2)
+    sure, black = np.array([d.confidence for _, d in flat]), np.zeros((len(flat), 3))
+    box = np.hstack([centre - size / 2, size])
+    seen = Candidates(frame, centre, centre, box, size.prod(axis=1), black, black, sure)
+    rows = best_path(seen, away=True).rows
+    pixels, confidence = np.full((len(sightings), 2), np.nan), np.zeros(len(sightings))
+    pixels[frame[rows]], confidence[frame[rows]] = centre[rows], sure[rows]
+    return pixels, confidence
 
 
 # --------------------------------------------------------------------------------------- detectors
@@ -184,11 +181,8 @@ class LearnedDetector:
 
         from .network import Network
 
-        weights = check_path("weights", weights)
-        if not weights.is_file():
-            raise FileNotFoundError(f"weights: no such file, got '{weights}'")
         network = Network()
-        network.load_state_dict(torch.load(weights, weights_only=True))
+        network.load_state_dict(torch.load(check_file("weights", weights), weights_only=True))
         self.network = network.eval().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def predict(self, image: Image) -> Predictions:
@@ -279,7 +273,7 @@ class Detection(NamedTuple):
     confidence: float
 
 
-def detections(predictions: Predictions, least: float = LEAST, most: int = 3) -> list[Detection]:
+def detections(predictions: Predictions, most: int = 3) -> list[Detection]:
     """What the predictions show, the surest first.
 
     The most confident prediction is averaged with those that agree with it, which is where the
@@ -288,8 +282,6 @@ def detections(predictions: Predictions, least: float = LEAST, most: int = 3) ->
     Parameters
     ----------
     predictions : ndarray, shape (5, n)
-    least : float
-        Smallest confidence of a detection.
     most : int
         Largest number of detections.
 
@@ -298,10 +290,10 @@ def detections(predictions: Predictions, least: float = LEAST, most: int = 3) ->
     list of Detection
     """
     found: list[Detection] = []
-    predictions = predictions[:, predictions[4] >= least / 2]
+    predictions = predictions[:, predictions[4] >= LEAST / 2]
     while len(found) < most and predictions.shape[1]:
         best = predictions[:, np.argmax(predictions[4])]
-        if best[4] < least:
+        if best[4] < LEAST:
             break
         apart = np.hypot(*(predictions[:2] - best[:2, None])) / best[2:4].mean()
         # Within a quarter of its size predictions speak of one target, if they are half as sure.

@@ -33,6 +33,7 @@ import numpy as np
 
 from ..arrays import Floats, Image
 from ..checks import check_choice, check_instance, check_integer, check_number, check_path
+from ..storage import check_file
 
 if TYPE_CHECKING:
     from av import VideoFrame
@@ -41,17 +42,14 @@ if TYPE_CHECKING:
 
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".ppm", ".pgm"})
 
-# When a packet's frame is shown, in ticks of the stream, and whether decoding can begin there.
-Shown = tuple[int | None, bool]
 
-
-def timing(packets: Sequence[Shown], stream: VideoStream) -> tuple[Floats, float]:
-    """When each frame is shown, in frames, and the number of frames in a second."""
+def timing(shown: Sequence[int | None], stream: VideoStream) -> tuple[Floats, float]:
+    """When each frame is `shown`, in ticks, as frames; and the number of frames in a second."""
     stated = float(stream.guessed_rate or 0)
-    even = np.arange(len(packets), dtype=float)
-    ticks = np.sort([time for time, _ in packets if time is not None]).astype(float)
+    even = np.arange(len(shown), dtype=float)
+    ticks = np.sort([time for time in shown if time is not None]).astype(float)
     steps = np.diff(ticks)
-    if len(ticks) < len(packets) or len(ticks) < 2 or not stream.time_base or steps.min() <= 0:
+    if len(ticks) < len(shown) or len(ticks) < 2 or not stream.time_base or steps.min() <= 0:
         return even, stated  # some old files do not say
     tick = float(stream.time_base)
     seconds = (ticks - ticks[0]) * tick
@@ -67,14 +65,14 @@ def timing(packets: Sequence[Shown], stream: VideoStream) -> tuple[Floats, float
 
 
 def cut_off(
-    packets: Sequence[Shown], end: float, container: InputContainer, stream: VideoStream
+    shown: Sequence[int | None], end: float, container: InputContainer, stream: VideoStream
 ) -> int:
     """Number of frames that were cut off the end of a file, by the duration that it states.
 
     `end` is when the last packet of all its streams ends, in seconds: a file whose sound goes on
     to its end is whole.
     """
-    times = [time for time, _ in packets if time is not None]
+    times = [time for time in shown if time is not None]
     if not (container.duration and stream.time_base and times):
         return 0
     rate, whole = float(stream.guessed_rate or 0), container.duration / 1e6
@@ -503,18 +501,18 @@ def _clock(path: str | os.PathLike) -> tuple[Floats, float]:
     if stills := find_stills(check_path("path", path)):
         return stills.clock, 0.0
     with _opened(path) as (container, stream):
-        stated, hidden, packets, end = stream.frames, 0, [], 0.0
+        stated, shown, end = stream.frames, [], 0.0
         for packet in container.demux():
-            if packet.pts is not None and packet.size and packet.time_base is not None:
-                end = max(end, float((packet.pts + (packet.duration or 0)) * packet.time_base))
-            if packet.stream.index != stream.index:
+            if not packet.size:  # the last one of a stream
                 continue
-            if packet.size and packet.is_discard:  # before the start that an editor has set
-                hidden += 1
-            elif packet.size:  # the last one of a stream is empty
-                packets.append((packet.pts, packet.is_keyframe))
-        clock, rate = timing(packets, stream)
-        count = stated - hidden if stated else len(clock) + cut_off(packets, end, container, stream)
+            if packet.pts is not None and packet.time_base is not None:
+                end = max(end, float((packet.pts + (packet.duration or 0)) * packet.time_base))
+            if packet.stream.index == stream.index and packet.is_discard:
+                stated -= 1  # before the start that an editor has set
+            elif packet.stream.index == stream.index:
+                shown.append(packet.pts)
+        clock, rate = timing(shown, stream)
+        count = stated if stream.frames else len(clock) + cut_off(shown, end, container, stream)
     return (clock if len(clock) == count else np.arange(count, dtype=float)), rate
 
 
@@ -557,9 +555,7 @@ def _opened(path: str | os.PathLike) -> Iterator[tuple[InputContainer, VideoStre
     """A video file while it is open, and the stream of it that matters."""
     import av
 
-    path = check_path("path", path)
-    if not path.is_file():
-        raise FileNotFoundError(f"path: no such video file, got {str(path)!r}")
+    path = check_file("path", path, "video file")
     if path.stat().st_size == 0:
         raise ValueError(f"path: must be a video file, got the empty file '{path}'")
     try:
@@ -574,7 +570,7 @@ def _opened(path: str | os.PathLike) -> Iterator[tuple[InputContainer, VideoStre
         yield container, cast("VideoStream", stream)
 
 
-def _packets(container: InputContainer, stream: VideoStream) -> list[Shown]:
+def _packets(container: InputContainer, stream: VideoStream) -> list[tuple[int | None, bool]]:
     """When each frame is shown, in ticks, and whether decoding can begin there."""
     packets = container.demux(stream)  # one a frame; the last one of a stream is empty
     return [(p.pts, p.is_keyframe) for p in packets if p.size and not p.is_discard]
@@ -635,18 +631,16 @@ def _turned(image: Image) -> Image:
 
 def reduce(image: Image, factor: int) -> Image:
     """The means over squares of `factor` pixels, also over what is left of squares at the edges."""
-    size = (-(-image.shape[1] // factor), -(-image.shape[0] // factor))
-    right, bottom = size[0] * factor - image.shape[1], size[1] * factor - image.shape[0]
+    bottom, right = (-side % factor for side in image.shape[:2])
     if right or bottom:
         padded = cv2.copyMakeBorder(image, 0, bottom, 0, right, cv2.BORDER_REPLICATE)
         image = np.asarray(padded, np.uint8)
-    while factor % 2 == 0:  # OpenCV halves an image much faster than it quarters one
-        factor //= 2
-        half = (image.shape[1] // 2, image.shape[0] // 2)
-        image = np.asarray(cv2.resize(image, half, interpolation=cv2.INTER_AREA), np.uint8)
-    if factor == 1:
-        return image
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+    while factor > 1:
+        step = factor if factor % 2 else 2  # OpenCV halves an image much faster than it quarters it
+        factor //= step
+        size = (image.shape[1] // step, image.shape[0] // step)
+        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+    return image
 
 
 class Reel:

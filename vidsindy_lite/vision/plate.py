@@ -10,6 +10,7 @@ is around it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import cv2
 import numpy as np
@@ -18,7 +19,6 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .video import Reel
 
-LONGEST = 480  # pixels of the longer side of a reduced frame
 _STRIP = 64  # rows of an image that are sorted at once: what they need stays in the cache
 
 
@@ -60,34 +60,21 @@ def changes(frame: Image, ground: Image, factor: Floats32) -> Floats32:
     return np.asarray(frame - (np.minimum(then, 255) if factor.max() > 1 else then), np.float32)
 
 
-def hull(mask: Bools) -> Ints:
-    """Convex outline (k, 2) of a mask: that of the first and the last pixels of its rows."""
-    rows = np.flatnonzero(mask.any(axis=1))
-    first = mask[rows].argmax(axis=1)
-    last = mask.shape[1] - 1 - mask[rows, ::-1].argmax(axis=1)
-    ends = np.column_stack([np.concatenate([first, last]), np.concatenate([rows, rows])])
-    return np.asarray(cv2.convexHull(ends.astype(np.int32))[:, 0], int)
-
-
 def carry(maps: NDArray, points: Floats) -> Floats:
     """Points (n, 2) taken through one map (3, 3), or each through its own (n, 3, 3)."""
     ends = np.einsum("...ij,...j->...i", maps, np.column_stack([points, np.ones(len(points))]))
     return ends[:, :2] / ends[:, 2:]
 
 
-def sampled(frames: int) -> Ints:
-    """The numbers of about 21 frames spread evenly over a clip of so many."""
-    return np.unique(np.linspace(0, frames - 1, 21).round().astype(int))
+def sampled(frames: Reel) -> tuple[Ints, Image]:
+    """About 21 frames spread evenly over a clip, as far as it holds them: their numbers, and they.
 
-
-def sample_frames(frames: Reel) -> NDArray[np.uint8]:
-    """The frames that are `sampled`, as far as the clip holds them, (m, height, width, 3)."""
-    info = frames.info
-    spread = sampled(info.frames).tolist()
-    samples, count = np.empty((len(spread), *info.size[::-1], 3), np.uint8), 0
-    for count, frame in enumerate(frames.whole.pick(spread), 1):
-        samples[count - 1] = frame
-    return samples[:count]
+    These are whole, (m, height, width, 3).
+    """
+    numbers = np.unique(np.linspace(0, frames.info.frames - 1, 21).round().astype(int))
+    image = np.dtype((np.uint8, (*frames.info.size[::-1], 3)))
+    samples = np.asarray(np.fromiter(frames.whole.pick(numbers.tolist()), image), np.uint8)
+    return numbers[: len(samples)], samples
 
 
 def _median(layers: Image) -> Image:
@@ -121,11 +108,9 @@ class Plate:
 
     Parameters
     ----------
-    samples : ndarray, shape (m, height, width, 3), uint8
+    samples : sequence of ndarray, shape (height, width, 3), uint8
     maps : ndarray, shape (m, 3, 3)
-        Where each lies in the first frame.
-    known : ndarray, shape (m,), bool
-        Which of the maps can be trusted.
+        Where each lies in the first frame, as far as that is known.
     hidden : ndarray, shape (m, 4), optional
         What of each sample is not the ground: left, top, width, height; NaN for nothing.
     lights : ndarray, shape (m, 3), optional
@@ -133,39 +118,34 @@ class Plate:
     """
 
     def __init__(
-        self, samples: Image, maps: Floats, known: Bools, hidden: Iterable[Floats] | None = None,
-        lights: Floats32 | None = None,
+        self, samples: Image | Sequence[Image], maps: Floats,
+        hidden: Iterable[Floats] | None = None, lights: Floats32 | None = None,
     ) -> None:  # fmt: skip
-        self.size = np.array(samples.shape[2:0:-1])
+        self.size = np.array(samples[0].shape[1::-1])
         self.moves = not np.allclose(maps, np.eye(3))
         corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * (self.size - 1.0)
-        ends = [carry(h, corners) for h in maps[known]]
+        ends = [carry(h, corners) for h in maps]
         low = np.floor(np.percentile([e.min(axis=0) for e in ends], 5, axis=0))
         high = np.ceil(np.percentile([e.max(axis=0) for e in ends], 95, axis=0))
-        middle = carry(maps[known][len(maps[known]) // 2], corners).mean(axis=0)
+        middle = carry(maps[len(maps) // 2], corners).mean(axis=0)
         # Frames that the plate may hold, side by side.
         reach = self.size * np.sqrt(2.5) / 2
         low = np.floor(np.maximum(low, middle - 1.5 * reach))
         high = np.minimum(high, middle + 1.5 * reach)
         self.shift = np.array([[1, 0, -low[0]], [0, 1, -low[1]], [0, 0, 1.0]])
         width, height = (int(x) for x in np.ceil(high - low) + 1)
-        shows = [np.full(samples.shape[1:3], 255, np.uint8)] * len(samples)
+        shows = [np.full(samples[0].shape[:2], 255, np.uint8)] * len(samples)
         if hidden is not None:
             shows = [_without(one, box) for one, box in zip(shows, hidden, strict=True)]
-        use = np.flatnonzero(known)
-        moves = [self.shift @ maps[i] for i in use]
-        shows = [shows[i] for i in use]
-        lights = np.ones((len(samples), 3), np.float32) if lights is None else lights
-        # The samples are views: copies would fill the memory.
-        self.image, count = _masked_median(
-            [samples[i] for i in use], shows, moves, np.reciprocal(lights[use]), (width, height)
-        )
+        moves = self.shift @ maps
+        gains = np.ones((len(maps), 3), np.float32) if lights is None else np.reciprocal(lights)
+        self.image, count = _masked_median(samples, shows, moves, gains, (width, height))
         # Samples that must show a place of the plate.
-        self.valid = np.where(count >= min(3, len(use)), 255, 0).astype(np.uint8)
+        self.valid = np.where(count >= min(3, len(maps)), 255, 0).astype(np.uint8)
         if hidden is not None:
             self._continue(shows, moves, count)
 
-    def _continue(self, shows: Sequence[Image], moves: Sequence[Floats], count: Image) -> None:
+    def _continue(self, shows: Sequence[Image], moves: Floats, count: Image) -> None:
         """Ground that the target hides is what is seen of it, or what is around it."""
         size = self.image.shape[1::-1]
         covered = np.zeros(self.valid.shape, np.uint8)
@@ -183,33 +163,23 @@ class Plate:
                 self.image[window], never[window], 3, cv2.INPAINT_TELEA
             )
 
-    def laid(self, image: Floats32, here: Floats) -> Floats32:
-        """An image over the plate, as the frame that the map carries sees it; 1000 beyond it."""
-        back, size = np.linalg.inv(self.shift @ here), self.size.tolist()
-        if np.array_equal(back, np.eye(3)):
-            return image[: size[1], : size[0]]
-        return np.asarray(cv2.warpPerspective(image, back, size, borderValue=1e3), np.float32)
-
-    def seen_from(
-        self, here: Floats, low: Floats | None = None, high: Floats | None = None, step: int = 1
-    ) -> tuple[Image, Bools]:
-        """The background in the frame that the map carries, or a window of it; where it is known.
-
-        Only every pixel of some `step` in each row and column.
-        """
+    def laid(
+        self, image: NDArray, here: Floats, low: Ints | None = None, high: Ints | None = None,
+        **how: Any,
+    ) -> NDArray:  # fmt: skip
+        """An image over the plate in the frame that the map carries, or in a window of that."""
         left, top = np.zeros(2, int) if low is None else low
         right, bottom = self.size if high is None else high
-        whole = np.linalg.inv(self.shift @ here)
-        if np.array_equal(whole, np.eye(3)):
-            window = np.s_[top:bottom:step, left:right:step]
-            return self.image[window], self.valid[window] > 0
-        size = np.array([right - left, bottom - top])
-        to_window = np.array([[1, 0, -left], [0, 1, -top], [0, 0, step]]) / step
-        size = (-(-size // step)).tolist()
-        back = to_window @ whole
-        image = cv2.warpPerspective(self.image, back, size, flags=cv2.INTER_LINEAR)
-        valid = cv2.warpPerspective(self.valid, back, size, flags=cv2.INTER_NEAREST)
-        return np.asarray(image, np.uint8), np.asarray(valid) > 0
+        back = np.linalg.inv(self.shift @ here)
+        if np.array_equal(back, np.eye(3)):
+            return image[top:bottom, left:right]
+        to_window = np.array([[1, 0, -left], [0, 1, -top], [0, 0, 1]])
+        return cv2.warpPerspective(image, to_window @ back, (right - left, bottom - top), **how)
+
+    def seen_from(self, here: Floats, *window: Ints) -> tuple[Image, Bools]:
+        """The background in the frame that the map carries, or a window; where it is known."""
+        valid = self.laid(self.valid, here, *window, flags=cv2.INTER_NEAREST)
+        return self.laid(self.image, here, *window), valid > 0
 
 
 def _without(shows: Image, box: Floats) -> Image:
@@ -222,7 +192,7 @@ def _without(shows: Image, box: Floats) -> Image:
 
 
 def _masked_median(
-    samples: Sequence[Image], shows: Sequence[Image], moves: Sequence[Floats], gains: Floats32,
+    samples: Sequence[Image] | Image, shows: Sequence[Image], moves: Floats, gains: Floats32,
     size: tuple[int, int],
 ) -> tuple[Image, Image]:  # fmt: skip
     """The median of the samples that show each pixel of a canvas, by how many it is shown.
@@ -252,7 +222,7 @@ def _masked_median(
 
 def lights_of(samples: Image, maps: Floats, known: Bools) -> Floats32:
     """How much brighter (m, 3) each of the samples of a film is than most of them."""
-    plate = Plate(samples, maps, known)
+    plate = Plate(samples[known], maps[known])
     return np.array([light(sample, *plate.seen_from(here))
                      for sample, here in zip(samples, maps, strict=True)])  # fmt: skip
 
@@ -276,9 +246,10 @@ def noise_of(samples: Image, maps: Floats, plate: Plate) -> float:
     """Of a pixel, in grey levels: of the quieter samples, which differ from the plate by that."""
     found = []
     step = max(3, samples.shape[2] // 640)
+    every = np.s_[::step, ::step]
     for sample, here in zip(samples, maps, strict=True):
-        then, known = plate.seen_from(here, step=step)
-        now = sample[::step, ::step]
+        then, known = plate.seen_from(here)
+        now, then, known = sample[every], then[every], known[every]
         if known.any():
             differs = changes(now, then, light(now, then, known))[known]
             found.append(1.4826 * np.median(np.abs(differs)))

@@ -29,15 +29,6 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from ..checks import check_integer
-from .background import (
-    LONGEST,
-    Plate,
-    carry,
-    lights_of,
-    noise_of,
-    sample_frames,
-    sampled,
-)
 from .camera import LOOSE, CameraMotion, at_rest, camera_motion, rescaled, stands_still
 from .candidates import (
     TOLD,
@@ -50,11 +41,12 @@ from .candidates import (
     candidates,
     followed,
     plainest_paths,
-    uncommon,
 )
+from .plate import Plate, carry, lights_of, noise_of, sampled
 from .refining import Lens, View, entire, fitting, roughness, swapped
 from .video import Reel, reduce
 
+_LONGEST = 480  # pixels of the longer side of a reduced frame
 _SHORTEST = 5  # frames of a path
 _LOUD = 12.0  # grey levels of noise, in more of which no pixel is told alone
 _LOOKS_ALONE = "no view tells it from its ground: it is followed by its looks alone"
@@ -115,17 +107,11 @@ class Film(NamedTuple):
     lights: Floats32
     doubts: tuple[str, ...]
 
-    @property
-    def factor(self) -> int:
-        """By how much the frames are reduced."""
-        return self.frames.factor
-
     @classmethod
     def of(cls, path: str | os.PathLike, *, rests: bool = False) -> Self:
         """From its sampled frames, and from all of them if its camera may move."""
-        frames = Reel(path, LONGEST)
-        samples = sample_frames(frames)
-        numbers = sampled(frames.info.frames)[: len(samples)]
+        frames = Reel(path, _LONGEST)
+        numbers, samples = sampled(frames)
         small = np.array([reduce(sample, frames.factor) for sample in samples])
         doubts: tuple[str, ...] = ()
         motion = at_rest(frames.info.frames)
@@ -145,7 +131,10 @@ class Film(NamedTuple):
         hide = None if boxes is None else boxes[self.sampled]
         if hide is not None:  # in the others it may be anywhere
             known &= np.isfinite(hide[:, 0])
-        plate = Plate(samples, here, known, hide, self.lights)
+        use = np.flatnonzero(known)
+        # The samples are views: copies would fill the memory.
+        plate = Plate([samples[i] for i in use], here[use], hide if hide is None else hide[use],
+                      self.lights[use])  # fmt: skip
         return plate, noise_of(samples, here, plate)
 
 
@@ -165,14 +154,14 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
     film = Film.of(path, rests=rests)
     seen, lights = sighted(film)
     n = len(lights)
-    boxed = None if hint is None else hint.boxed(film.frames.info.size, n, film.factor)
+    boxed = None if hint is None else hint.boxed(film.frames.info.size, n, film.frames.factor)
     seed = boxed and _tightened(seen, boxed)
     paths = _paths(seen, hint, seed)
     if not paths and seed is None:
         return nothing(film.motion, n)
     boxes = None
     for k in range(3):  # if it covers its own ground: before ground that is without it
-        covered = _covering(seen, paths[0].rows, n, seed, rims=k == 0) if paths else None
+        covered = _covering(film, seen, paths[0].rows, seed, rims=k == 0) if paths else None
         if covered is None or (boxes is not None and _same(covered, boxes)):
             break
         boxes = covered
@@ -227,8 +216,7 @@ def sighted(
     if noise > _LOUD:
         frames = (np.asarray(cv2.GaussianBlur(frame, (0, 0), 1.0), np.uint8) for frame in frames)
         noise /= 2 * np.sqrt(np.pi)
-    found, lights = candidates(frames, film.maps, plate, noise)
-    return uncommon(found, targets), lights
+    return candidates(frames, film.maps, plate, noise, targets)
 
 
 def _paths(seen: Candidates, hint: Hint | None, seed: Spot | None) -> list[Motion]:
@@ -287,25 +275,24 @@ def _rivals(paths: Sequence[Motion]) -> Sequence[Motion]:
 
 
 def _covering(
-    seen: Candidates, rows: Ints, n: int, seed: Spot | None, *, rims: bool
+    film: Film, seen: Candidates, rows: Ints, seed: Spot | None, *, rims: bool
 ) -> Floats | None:
     """Boxes (n, 4) of a target that covers its own ground in many frames, None if it does not.
 
     Of one that hardly leaves its place a plate with it shows the `rims` only: all that differs
     there is the target's place.
     """
-    centre, size = seen.centre[rows], seen.box[rows, 2:]
-    if _staying(centre, size) < 0.35:
+    centre, size, n = seen.centre[rows], seen.box[rows, 2:], len(film.maps)
+    # The median of the samples does not show what is in one or two of them.
+    if np.isin(film.sampled, seen.frame[rows]).sum() < 3 or _staying(centre, size) < 0.35:
         return None
-    low = np.percentile(seen.box[rows, :2], 5, axis=0)
-    high = np.percentile(seen.box[rows, :2] + seen.box[rows, 2:], 95, axis=0)
+    first, end = seen.box[:, :2], seen.box[:, :2] + seen.box[:, 2:]
+    low, high = np.percentile(first[rows], 5, axis=0), np.percentile(end[rows], 95, axis=0)
     if rims and ((high - low) < 2 * np.median(size, axis=0) + 4).all():
         beside = (np.abs(seen.centre - (low + high) / 2) < (high - low) / 2 + 2).all(axis=1)
         beside &= seen.area < 2 * (high - low).prod()
-        low = np.minimum(low, np.percentile(seen.box[beside, :2], 5, axis=0))
-        high = np.maximum(
-            high, np.percentile((seen.box[:, :2] + seen.box[:, 2:])[beside], 95, axis=0)
-        )
+        low = np.minimum(low, np.percentile(first[beside], 5, axis=0))
+        high = np.maximum(high, np.percentile(end[beside], 95, axis=0))
         return np.tile([*low, *(high - low)], (n, 1))
     boxes = np.full((n, 4), np.nan)
     boxes[seen.frame[rows]] = seen.box[rows]
@@ -316,8 +303,9 @@ def _covering(
 
 def _staying(centre: Floats, size: Floats) -> float:
     """In what share of its frames a target of these centres and sizes (k, 2) covers one place."""
+    some = centre[:: 1 + len(centre) // 2000]  # all pairs of a long film would fill the memory
     with np.errstate(invalid="ignore"):
-        inside = (np.abs(centre[:, None] - centre) < size / 2).all(axis=2)
+        inside = (np.abs(some[:, None] - centre) < size / 2).all(axis=2)
     return float(inside.mean(axis=1).max())
 
 
@@ -371,11 +359,9 @@ def _differing(seen: Candidates, path: Candidates) -> float:
 
 def lens_of(film: Film, *ways: Ways) -> Lens:
     """What looks at targets in whole frames."""
-    boxes = None
-    for way in ways:
-        if _staying(way.centre[film.sampled], way.box[film.sampled, 2:]) > 0.25:
-            boxes = way.box
-    return Lens(*film.ground(boxes, whole=True))
+    at = film.sampled
+    staying = [way.box for way in ways if _staying(way.centre[at], way.box[at, 2:]) > 0.25]
+    return Lens(*film.ground(staying[-1] if staying else None, whole=True))
 
 
 def viewed(film: Film, lens: Lens, ways: Ways, lights: list[Floats32]) -> list[View | None]:
@@ -410,13 +396,13 @@ def _confidence(errors: Floats | float) -> Floats:
 def _example(film: Film, seen: Candidates, path: Motion) -> str:
     """Where somebody may look at what moves along a path."""
     row = path.rows[len(path.rows) // 2]
-    u, v = film.factor * seen.centre[row]
+    u, v = film.frames.factor * seen.centre[row]
     return f"e.g. in frame {seen.frame[row]} at ({u:.0f}, {v:.0f})"
 
 
 def _doubts(film: Film, seen: Candidates, paths: list[Motion], ways: Ways) -> tuple[str, ...]:
     """Whether the camera is known, and what else moves about as plainly, elsewhere."""
-    k = film.factor
+    k = film.frames.factor
     for path in _rivals(paths):
         at = seen.frame[path.rows]
         off = np.linalg.norm(k * seen.centre[path.rows] + (k - 1) / 2 - ways.centre[at], axis=1)
@@ -445,7 +431,7 @@ def expected(seen: Candidates, rows: Ints, film: Film, n: int) -> Ways:
     colour[:] = np.median(seen.colour[rows], axis=0)
     near = np.column_stack([np.interp(frames, at, x) for x in seen.colour[rows].T])
     colour[frames] = 0.5 * colour[frames] + 0.5 * near
-    k = film.factor
+    k = film.frames.factor
     return Ways(k * centre + (k - 1) / 2, k * box, colour)
 
 
@@ -503,7 +489,7 @@ def _filled(
     vague = 2.0  # pixels to which looks tell a place
     if seed is None and bound < vague:
         return found
-    n, k = len(found.pixels), film.factor
+    n, k = len(found.pixels), film.frames.factor
     pixels, confidence = found.pixels.copy(), found.confidence.copy()
     alike = carry(film.motion.maps[:n], k * looks.box[:, :2] + (k - 1) / 2)
     side = k * np.sqrt(looks.box[:, 2:].prod(axis=1))
@@ -600,7 +586,7 @@ def _lanes(
     seen: Candidates, paths: list[Motion], count: int
 ) -> tuple[list[list[Motion]], list[Motion]]:
     """The paths of each target, one after the other in time; and paths for which none is left."""
-    lanes: list[list[Motion]] = []
+    lanes: list[list[Motion]] = [[] for _ in range(count)]
     left = []
     plainest = max((path.rating / len(path.rows) for path in paths), default=0.0)
     taken = np.zeros((count, 1 + seen.frame.max(initial=0)), bool)
@@ -614,10 +600,8 @@ def _lanes(
             left.append(path)
             continue
         taken[free[0], first : last + 1] = True
-        if free[0] == len(lanes):
-            lanes.append([])
         lanes[free[0]].append(path)
-    return lanes, left
+    return [lane for lane in lanes if lane], left
 
 
 def _joined(ways: list[Ways]) -> Ways:

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.background import (
+from vidsindy_lite.vision.plate import (
     Plate,
     least_difference,
     lights_of,
@@ -23,7 +23,7 @@ def panning(frames, u, v=0):
 @pytest.mark.parametrize("pan", [(20, 0), (0, -15)])
 def test_a_plate_of_a_camera_that_turns_far_shows_what_is_around_the_middle_of_its_way(pan):
     samples = np.full((21, 36, 48, 3), 100, np.uint8)
-    plate = Plate(samples, panning(21, *pan), np.ones(21, bool))
+    plate = Plate(samples, panning(21, *pan))
     along = int(np.argmax(np.abs(pan)))
     size, frame = plate.image.shape[1::-1], (48, 36)
     assert 2.2 * frame[along] < size[along] < 2.6 * frame[along]
@@ -41,12 +41,11 @@ def test_a_plate_is_of_one_light_though_the_exposure_changes(pan):
     samples = np.array([(a * ground[:, pan * k :][:, :140]).round().astype(np.uint8)
                         for k, a in enumerate(exposure)])  # fmt: skip
     maps = panning(15, pan)
-    known = np.ones(15, bool)
-    lights = lights_of(samples, maps, known)
+    lights = lights_of(samples, maps, np.ones(15, bool))
     ratio = lights / exposure[:, None]
     np.testing.assert_allclose(ratio / ratio[7], 1, atol=0.04)
-    plain = Plate(samples, maps, known)
-    even = Plate(samples, maps, known, lights=lights)
+    plain = Plate(samples, maps)
+    even = Plate(samples, maps, lights=lights)
     shown, _ = even.seen_from(maps[7])
     light = shown / ground[:, 7 * pan :][:, :140]
     assert light.std() < 0.01 * light.mean()
@@ -63,7 +62,7 @@ def test_the_tolerance_is_five_times_the_noise_and_what_a_displaced_edge_does(
     scene = np.full((30, 50, 3), 100, np.uint8)
     scene[:, 25:] = 150
     samples = np.array([scene[:, pan * k : pan * k + 40] for k in range(5)])
-    plate = Plate(samples, panning(5, pan), np.ones(5, bool))
+    plate = Plate(samples, panning(5, pan))
     found = tolerance(plate.image, least_difference(noise), moves=plate.moves)[15]
     step = int(np.argmax(plate.image[15, :, 0] > 125))
     known = plate.valid[15] > 0
