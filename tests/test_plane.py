@@ -177,6 +177,15 @@ def test_the_error_of_the_length_is_that_of_g(monkeypatch):
     np.testing.assert_allclose(found.fitted, found.x, atol=0.01)
 
 
+def test_the_error_of_g_does_not_hang_on_the_order_of_the_marks(monkeypatch):
+    filmed(monkeypatch, pixels_of(noisy(flight()[1], 0)))
+    one, other = (
+        vl.discover_from_video("throw.mp4", (*STICK[k : k + 2], *STICK[2 - k : 4 - k], 0.5)).g.error
+        for k in (0, 2)
+    )
+    assert one == pytest.approx(other, rel=1e-6)
+
+
 def test_a_spring_on_a_line_has_a_period(monkeypatch):
     t = np.arange(72) / 24
     x = (0.2 * np.exp(-0.1 * t) * np.cos(5.3 * t))[:, None] * [0.03, 1]

@@ -222,18 +222,20 @@ def four_places(
             s, c = (seen[1] - seen[0]) / np.hypot(*(seen[1] - seen[0]))
             places = places @ np.array([[c, s], [-s, c]])
         return marks, places, float(np.hypot(*edges.T).min())
-    origin, metres, pixels = np.array([0.0, size[1] - 1.0]), 1.0, 0.0
+    origin = middle = np.array([0.0, size[1] - 1.0])
+    metres, pixels = 1.0, 0.0
     if length is not None:
         told = check_vector("length", length, 5)
         ends, metres = _in_picture("length", told[:4], size), float(told[4])
-        origin, pixels = ends[0], float(np.hypot(*(ends[1] - ends[0])))
+        origin, middle, pixels = ends[0], ends.mean(axis=0), float(np.hypot(*(ends[1] - ends[0])))
         if not (pixels > 2 * MARK and metres > 0):
             raise ValueError(
                 "length: must be two marks apart from each other and a distance above 0, "
                 f"got {tuple(length)}"
             )
     axes = np.array([[-upwards[1], upwards[0]], upwards])
-    return origin + (pixels or 1.0) * square @ axes, metres * square, pixels
+    marks, scale = middle + (pixels or 1.0) * (square - 0.5) @ axes, metres / (pixels or 1.0)
+    return marks, scale * (marks - origin) @ axes.T, pixels
 
 
 def _in_picture(name: str, given: Floats, size: tuple[int, int]) -> Floats:
