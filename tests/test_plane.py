@@ -248,6 +248,8 @@ def test_the_command_writes_g_with_its_error(monkeypatch, tmp_path, capsys):
     assert data["period"] is None
     assert "<img" in (tmp_path / "law" / "report.html").read_text("utf-8")
     assert main(given) == 0  # an earlier report is replaced
+    assert main([*given, "--hint", "3.7,100,90,20,30"]) == 2
+    assert "frame: must be an integer of at least 0, got 3.7" in capsys.readouterr().err
 
 
 def test_the_command_draws_the_track_of_what_has_no_law(monkeypatch, tmp_path, capsys):

@@ -185,8 +185,8 @@ def _found(options: argparse.Namespace, rig: Any, kind: str, asked: dict[str, An
         return discover_from_tracks(options.tracks, rig, **asked)
     if kind == "one video alone":
         if options.hint is not None:
-            frame, *box = check_vector("hint", options.hint, 5)
-            asked["hint"] = Hint(frame=int(frame), box=tuple(box))
+            frame, *box = check_vector("hint", options.hint, 5).tolist()
+            asked["hint"] = Hint(frame=frame if frame % 1 else int(frame), box=tuple(box))
         return discover_from_video(options.videos[0], **asked)
     fps, t = asked.pop("fps"), None
     if fps is not None:

@@ -189,6 +189,13 @@ def test_the_learned_detector_invents_nothing_behind_a_post(tmp_path):
     assert (found.confidence[clear] >= LEAST).mean() > 0.97
 
 
+def test_that_nothing_is_found_is_told(tmp_path):
+    film = write_video(tmp_path / "grey.mov", np.full((5, 96, 128, 3), 90, np.uint8))
+    assert track(film, "learned").warnings == (
+        "grey.mov: nothing was found that looks like one target",
+    )
+
+
 def test_any_onnx_model_tracks(tmp_path):
     truth = winding_path(40)
     scene = Scene("sea", size=32, image_size=SIZE)

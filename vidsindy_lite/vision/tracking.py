@@ -104,8 +104,10 @@ def track(
 def _lost(found: Track) -> tuple[str, ...]:
     """Is the target lost in many of the frames from its first to its last?"""
     at = np.flatnonzero(np.isfinite(found.pixels[:, 0]))
+    if not len(at):
+        return () if found.warnings else ("nothing was found that looks like one target",)
     # Share of the frames below which many of them are lost.
-    if not len(at) or len(at) >= 0.5 * (between := at[-1] - at[0] + 1):
+    if len(at) >= 0.5 * (between := at[-1] - at[0] + 1):
         return ()
     lost = between - len(at)
     return (f"the target is lost in {lost} of {between} frames, from {at[0]} to {at[-1]}",)
