@@ -180,11 +180,7 @@ def test_the_command_line(tmp_path, capsys):
         ("matrix = [[", "matrix = [[-", "K: must be"),
         (", 0.0, 6", ", 3.0, 6", "K: must have no skew, got 3, in"),
         ('name = "1"', "rotation_count = 1", "camera cam_1: rotation_count: must be 0, got 1"),
-        (
-            "distortions = [",
-            "distortions = [1, 1, 1, 1, ",
-            "distortion: must be at most 8 finite numbers, k1",
-        ),
+        ("distortions = [", "distortions = [1, 1, 1, 1, ", "distortion: must be at most 8 finite"),
         ("size = [ 1280, 720,]", "size = [ 1280 ]", r"size: must be .* of shape \(2,\), got"),
         ("rotation = [", "rotation = ['a', ", "R: must be an array of real numbers, got"),
     ],
