@@ -115,6 +115,9 @@ def test_plain_json_and_arrays(tmp_path):
     assert_same(read_calibration(paths, SIZE), parts)
     with pytest.raises(ValueError, match=r"^paths: image_size: must be given .*, in '.*0\.npz'"):
         read_calibration(paths)
+    stacked = {key: [part[key] for part in parts] for key in parts[0]}
+    np.savez(paths[0], **stacked | {"size": SIZE})
+    assert_same(read_calibration(paths[:1]), parts)
 
 
 def projection(part):
@@ -211,8 +214,7 @@ def test_malformed_tables_are_refused_by_name(tmp_path, old, new, message):
         ("a.json", '{"P": 5}', "must hold 11 DLT coefficients"),
         (
             "a.json",
-            '{"K": [[1, 0, 1], [0, 1, 1], [0, 0, 1]], "R": [[2, 0, 0], [0, 1, 0], [0, 0, 1]'
-            '], "t": [0, 0, 1]}',
+            '{"K": [1, 0, 1, 0, 1, 1, 0, 0, 1], "R": [2, 0, 0, 0, 1, 0, 0, 0, 1], "t": [0, 0, 1]}',
             "R: must be a rotation, got a matrix that is none",
         ),
         ("a.json", '{"K": "x", "R": 1, "t": 2}', "K: must be an array of real numbers"),

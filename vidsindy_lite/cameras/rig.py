@@ -647,7 +647,7 @@ def _tables(content: Any, name: str, warnings: list[str]) -> Iterator[tuple[str,
         warnings.append(f"{name}nothing is known of {', '.join(strange):.80}, which is left out")
     stacked = np.ndim(known.get("K", 0)) == 3
     for i in range(len(known["K"]) if stacked else 1):
-        yield name, {key: value[i] if stacked else value for key, value in known.items()}
+        yield name, {key: v[i] if stacked and np.ndim(v) > 1 else v for key, v in known.items()}
 
 
 def _is_set(value: Any) -> bool:
