@@ -53,7 +53,7 @@ class Lags:
     clocks : tuple of ndarray, shape (n_i,)
         When each frame was taken, see `align`; empty if all videos are even.
     rate_errors : ndarray, shape (m,)
-        Standard errors of the rates that were learned; zero of the others.
+        Standard errors of the rates that were learned, zero of the others; empty if none was.
     """
 
     frames: Floats
@@ -63,10 +63,6 @@ class Lags:
     warnings: tuple[str, ...] = ()
     clocks: tuple[Floats, ...] = field(default=(), repr=False)
     rate_errors: Floats = field(default_factory=lambda: np.zeros(0))
-
-    def __post_init__(self) -> None:
-        if not len(self.rate_errors):
-            object.__setattr__(self, "rate_errors", np.zeros(len(self.frames)))
 
     @property
     def agree(self) -> bool:
