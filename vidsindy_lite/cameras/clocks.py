@@ -360,8 +360,7 @@ class Clock:
         ]
         usual = np.array([np.median(np.diff(times)) if len(times) > 1 else 1 for times in stated])
         frames = [(times - times[0]) / step for times, step in zip(stated, usual, strict=True)]
-        even = [np.abs(one - np.rint(one)).max() < _ROUNDING for one in frames]
-        frames = [np.rint(one) if near else one for near, one in zip(even, frames, strict=True)]
+        frames = [np.rint(f) if np.abs(f - np.rint(f)).max() < _ROUNDING else f for f in frames]
         return cls(stated[0], usual[0] / usual, frames)
 
     @classmethod

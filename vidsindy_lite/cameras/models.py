@@ -452,18 +452,14 @@ class Camera(ABC):
 
     def seen(self, centred: Floats) -> Floats:
         """Pixels at which points x_c of the ideal image are seen through the lens, shape (n, 2)."""
-        u, v = self.centre
-        bent = self._through(distorted, centred)
-        return np.column_stack((u + bent[:, 0], v - self.aspect * bent[:, 1]))
+        return self.centre + self._through(distorted, centred) * [1, -self.aspect]
 
     def centred(self, pixels: Floats) -> Floats:
         """Pixels in the ideal image, measured from its principal point, right and *up*: x_c.
 
         Shape (n, 2). Of a camera that is not calibrated, without its distortion.
         """
-        u, v = self.centre
-        bent = np.column_stack((pixels[:, 0] - u, (v - pixels[:, 1]) / self.aspect))
-        return self._through(undistorted, bent)
+        return self._through(undistorted, (pixels - self.centre) / [1, -self.aspect])
 
     @property
     def centre(self) -> Floats:

@@ -407,8 +407,7 @@ def check_views(tracks: Sequence[Floats], rig: Rig) -> list[Floats]:
     lengths = [len(track) for track in checked]
     if len(set(lengths)) > 1:
         raise ValueError(f"tracks: must have the same number of frames, got {lengths}")
-    seen = [np.isfinite(track).all(axis=1, keepdims=True) for track in checked]
-    whole = [np.where(rows, track, np.nan) for rows, track in zip(seen, checked, strict=True)]
+    whole = [np.where(np.isfinite(t).all(axis=1, keepdims=True), t, np.nan) for t in checked]
     return at_once(rig.cameras, whole)
 
 
