@@ -11,6 +11,7 @@ is told, the others are left out.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations, product
 from typing import NamedTuple
@@ -54,9 +55,8 @@ class _Run:
 
 def stacked(values: Floats, width: int) -> Floats:
     """Columns side by side, (n, width k), one below the other, with a row of NaN in between."""
-    parts = np.split(values, values.shape[1] // width, axis=1)
-    between = np.full((1, width), np.nan)
-    return np.concatenate([row for part in parts for row in (part, between)][:-1])
+    parts = values.reshape(len(values), values.shape[1] // width, width).swapaxes(0, 1)
+    return np.pad(parts, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan).reshape(-1, width)[:-1]
 
 
 def side_by_side(rows: Floats, count: int) -> Floats:
@@ -157,11 +157,9 @@ def _cameras(views: Sequence[Floats], runs: Sequence[_Run], rig: Rig) -> tuple[C
     tried = []
     for order in product(orders[:1], *[orders] * (len(views) - 1)):
         here = [place[:, list(o)] for place, o in zip(places, order, strict=True)]
-        try:
+        with suppress(ValueError):
             learned = learn_cameras(_rows(here), rig).cameras
-        except ValueError:
-            continue
-        tried.append((_misfit(here, learned), learned))
+            tried.append((_misfit(here, learned), learned))
     tried.sort(key=lambda one: one[0])
     if not tried or (len(tried) > 1 and not tried[0][0] * ALIKE < tried[1][0]):
         sizes = ", ".join(f"{size:.2g}" for size, _ in tried[:2]) or "none"

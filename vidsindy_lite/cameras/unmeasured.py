@@ -224,14 +224,11 @@ def _homed(
     cameras: Sequence[PerspectiveCamera], poses: Sequence[_Pose]
 ) -> tuple[PerspectiveCamera, ...]:
     """The cameras at poses of which the first is at home, and the second a unit from it."""
-    home, place = poses[0]
-    turns = [turn @ home.T for turn, _ in poses]
-    shifts = [shift - turn @ place for turn, (_, shift) in zip(turns, poses, strict=True)]
-    unit = np.linalg.norm(shifts[1])
-    return tuple(
-        camera.posed(turn * [1, -1, -1], shift / unit)
-        for camera, turn, shift in zip(cameras, turns, shifts, strict=True)
-    )
+    turns, shifts = map(np.array, zip(*poses, strict=True))
+    turns = turns @ turns[0].T
+    shifts = shifts - turns @ shifts[0]
+    each = zip(cameras, turns * [1, -1, -1], shifts / np.linalg.norm(shifts[1]), strict=True)
+    return tuple(camera.posed(turn, shift) for camera, turn, shift in each)
 
 
 def _mirrored(best: Adjustment, other: Adjustment) -> bool:
@@ -250,15 +247,12 @@ def _framed(rig: Rig, fit: Adjustment, mirrored: bool) -> Rig:
 
     They are as good as measured by eye: what the tracks tell is learned later.
     """
-    cameras, middle = fit.cameras, np.nanmean(fit.points, axis=0)
-    between = np.asarray(cameras[1].position) - np.asarray(cameras[0].position)
-    apart = float(np.linalg.norm(between))
-    unit = (1.0 if rig.distance is None else rig.distance) / apart
-    first, *others = (
-        replace(camera, position=unit * (np.asarray(camera.position) - middle))
-        for camera in cameras
-    )
-    loose = [replace(camera, position_error=unit * apart, normal_error=45.0) for camera in others]
+    distance = 1.0 if rig.distance is None else rig.distance
+    places = np.array([camera.position for camera in fit.cameras]) - np.nanmean(fit.points, axis=0)
+    places *= distance / np.linalg.norm(places[1] - places[0])
+    each = zip(fit.cameras, places, strict=True)
+    first, *others = (replace(camera, position=place) for camera, place in each)
+    loose = [replace(camera, position_error=distance, normal_error=45.0) for camera in others]
     doubts = (_EITHER_HAND,) if mirrored else ()
     return Rig((first, *loose), doubts, _note(rig))
 
