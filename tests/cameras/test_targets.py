@@ -60,8 +60,11 @@ def test_orthographic_views_whose_cameras_are_not_learned_yet(seed, count):
         assert_told_apart(told.tracks, views)
 
 
-def test_a_meeting_that_one_view_alone_does_not_see_costs_its_frames_only():
+@pytest.mark.parametrize("twin", [False, True])
+def test_a_meeting_that_one_view_alone_does_not_see_costs_its_frames_only(twin):
     rig, truth, views = two_walks(3)
+    if twin:  # of two views from one place none tells the other anything
+        rig, truth[2], views[2] = vl.Rig([*rig.cameras[:2], rig.cameras[0]]), truth[0], views[0]
     views = [view.reshape(FRAMES, -1) for view in views]
     views[1][100:] = np.roll(views[1][100:], 2, axis=1)
     views[1][95:105] = np.nan

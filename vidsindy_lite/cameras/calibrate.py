@@ -408,7 +408,8 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     """
     errors = np.array([known_to(camera) for camera in rig.cameras])
     moving = (lags.errors > 0) & np.isfinite(lags.errors)
-    errors[moving, LAG] = errors[lags.rate_errors > 0, DRIFT] = np.inf
+    drifting = np.flatnonzero(lags.rate_errors > 0)
+    errors[moving, LAG] = errors[drifting, DRIFT] = np.inf
     footage = Footage.of(tracks, lags.frames, lags.rates, lags.clocks or None)
     near = adjust(footage, learned.cameras, errors, most=0)
     modes = np.einsum("ik,nji->knj", near.factor, near.reduced.follow)

@@ -53,7 +53,7 @@ class Lags:
     clocks : tuple of ndarray, shape (n_i,)
         When each frame was taken, see `align`; empty if all videos are even.
     rate_errors : ndarray, shape (m,)
-        Standard errors of the rates that were learned; zero of the others.
+        Standard errors of the rates that were learned, zero of the others; empty if none was.
     """
 
     frames: Floats
@@ -63,10 +63,6 @@ class Lags:
     warnings: tuple[str, ...] = ()
     clocks: tuple[Floats, ...] = field(default=(), repr=False)
     rate_errors: Floats = field(default_factory=lambda: np.zeros(0))
-
-    def __post_init__(self) -> None:
-        if not len(self.rate_errors):
-            object.__setattr__(self, "rate_errors", np.zeros(len(self.frames)))
 
     @property
     def agree(self) -> bool:
@@ -364,8 +360,7 @@ class Clock:
         ]
         usual = np.array([np.median(np.diff(times)) if len(times) > 1 else 1 for times in stated])
         frames = [(times - times[0]) / step for times, step in zip(stated, usual, strict=True)]
-        even = [np.abs(one - np.rint(one)).max() < _ROUNDING for one in frames]
-        frames = [np.rint(one) if near else one for near, one in zip(even, frames, strict=True)]
+        frames = [np.rint(f) if np.abs(f - np.rint(f)).max() < _ROUNDING else f for f in frames]
         return cls(stated[0], usual[0] / usual, frames)
 
     @classmethod

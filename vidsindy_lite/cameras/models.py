@@ -296,8 +296,9 @@ class Camera(ABC):
         if abs(hypot(*normal) - 1) > 1e-15:  # a unit vector stays as it is: files round-trip
             normal = unit_vector("normal", normal)
         self._set(normal=frozen(normal))
-        if self.position is not None:
-            self._set(position=frozen(check_vector("position", self.position, 3)))
+        for name, size in (("position", 3), ("principal_point", 2)):
+            if (given := getattr(self, name)) is not None:
+                self._set(**{name: frozen(check_vector(name, given, size))})
         if (self.scale is None) != (self.angle is None):
             raise ValueError(
                 "scale and angle: give both (calibrated) or neither (to be learned), got "
@@ -307,13 +308,10 @@ class Camera(ABC):
             scale, angle = check_positive("scale", self.scale), check_number("angle", self.angle)
             self._set(scale=scale, angle=angle)
         self._set(image_size=check_image_size(self.image_size))
-        if self.principal_point is not None:
-            point = check_vector("principal_point", self.principal_point, 2)
-            self._set(principal_point=frozen(point))
         self._set(aspect=check_positive("aspect", self.aspect))
-        if not abs(check_number("readout", self.readout)) <= 1:
+        self._set(readout=check_number("readout", self.readout))
+        if abs(self.readout) > 1:
             raise ValueError(f"readout: must be between -1 and 1 frames, got {self.readout}")
-        self._set(readout=float(self.readout))
         for name, error in self.errors.items():
             if check_number(name, error) < 0:
                 raise ValueError(f"{name}: must be zero or positive, got {error:g}")
@@ -454,26 +452,20 @@ class Camera(ABC):
 
     def seen(self, centred: Floats) -> Floats:
         """Pixels at which points x_c of the ideal image are seen through the lens, shape (n, 2)."""
-        u, v = self.centre
-        bent = self._through(distorted, centred)
-        return np.column_stack((u + bent[:, 0], v - self.aspect * bent[:, 1]))
+        return self.centre + self._through(distorted, centred) * [1, -self.aspect]
 
     def centred(self, pixels: Floats) -> Floats:
         """Pixels in the ideal image, measured from its principal point, right and *up*: x_c.
 
         Shape (n, 2). Of a camera that is not calibrated, without its distortion.
         """
-        u, v = self.centre
-        bent = np.column_stack((pixels[:, 0] - u, (v - pixels[:, 1]) / self.aspect))
-        return self._through(undistorted, bent)
+        return self._through(undistorted, (pixels - self.centre) / [1, -self.aspect])
 
     @property
-    def centre(self) -> tuple[float, float]:
+    def centre(self) -> Floats:
         """The principal point."""
-        if self.principal_point is not None:
-            return self.principal_point[0], self.principal_point[1]
-        width, height = self.image_size
-        return (width - 1) / 2, (height - 1) / 2
+        middle = (np.array(self.image_size) - 1) / 2
+        return middle if self.principal_point is None else self.principal_point
 
     def _through(self, lens: Callable[[Floats, Floats], Floats], centred: Floats) -> Floats:
         """What the lens makes of an ideal image, or the ideal image of what is seen."""
@@ -526,8 +518,6 @@ def undistorted(points: Floats, coefficients: Floats) -> Floats:
 
     NaN where the model shows none there, as beyond the circle where its image folds.
     """
-    if not len(points):  # which OpenCV refuses
-        return points
     enough = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, _UNBENT, _SETTLED)
     ideal = cv2.undistortPoints(points[:, None], np.eye(3), coefficients, criteria=enough)
     found = np.asarray(ideal[:, 0], float)
@@ -537,8 +527,6 @@ def undistorted(points: Floats, coefficients: Floats) -> Floats:
 
 def distorted(points: Floats, coefficients: Floats) -> Floats:
     """Where points of the ideal image, (n, 2), are seen through the lens."""
-    if not len(points):  # which OpenCV refuses
-        return points
     ahead, still = np.column_stack((points, np.ones(len(points)))), np.zeros(3)
     seen, _ = cv2.projectPoints(ahead[:, None], still, still, np.eye(3), coefficients)
     return np.asarray(seen[:, 0], float)
@@ -674,8 +662,8 @@ class PerspectiveCamera(Camera):
             self._set(distortion=frozen(np.pad(given, (0, size - len(given)))))
 
     def _through(self, lens: Callable[[Floats, Floats], Floats], centred: Floats) -> Floats:
-        if self.distortion is None or self.scale is None:
-            return centred
+        if self.distortion is None or self.scale is None or not len(centred):
+            return centred  # which OpenCV refuses, if there is none
         return lens(self.scale * centred * _DOWN, self.distortion) * _DOWN / self.scale
 
     @property
@@ -727,22 +715,18 @@ class PerspectiveCamera(Camera):
         """
         scale, angle = self.calibration
         image = check_rows("x", x, 3) @ self.matrix[:, :3].T + self.matrix[:, 3]
-        depth = image[:, 2]
+        plane, depth = image[:, :2] @ turn(angle), image[:, 2]
         if not radius > 0 or (depth <= radius).any():
             raise ValueError(
                 f"radius: must be positive and less than each distance, got {radius} "
                 f"and {np.nanmin(depth)}"
             )
-        out = image[:, :2] / (scale * depth[:, None]) @ turn(angle)
         clear = depth**2 - radius**2
-        across = radius / (scale * np.sqrt(clear))
-        # Along `out` the half axis grows by the secant of the angle from the line of view.
-        squared = np.sum(out**2, axis=1)
-        along = across * np.sqrt(1 + squared * (scale * depth) ** 2 / clear)
-        outer = out[:, :, None] * out[:, None, :]
-        stretch = (along - across) / np.where(squared > 0, squared, 1)
-        shapes = across[:, None, None] * np.eye(2) + stretch[:, None, None] * outer
-        centres = out * (depth**2 / clear)[:, None]
+        # Away from the line of view the half axis grows by so many times, across it by none.
+        along = np.sqrt(1 + np.sum(plane**2, axis=1) / clear)
+        stretch = plane[:, :, None] * plane[:, None, :] / (clear * (1 + along))[:, None, None]
+        shapes = (radius / (scale * np.sqrt(clear)))[:, None, None] * (np.eye(2) + stretch)
+        centres = plane * (depth / (scale * clear))[:, None]
         # What the lens makes of small shapes, by steps of a pixel.
         ends = [(self.seen(centres + e) - self.seen(centres - e)) / 2 for e in np.eye(2)]
         return self.seen(centres), np.stack(ends, axis=-1) @ shapes @ np.diag(_DOWN)

@@ -33,7 +33,7 @@ from __future__ import annotations
 import os
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import chain
 from pathlib import Path
@@ -407,8 +407,7 @@ def check_views(tracks: Sequence[Floats], rig: Rig) -> list[Floats]:
     lengths = [len(track) for track in checked]
     if len(set(lengths)) > 1:
         raise ValueError(f"tracks: must have the same number of frames, got {lengths}")
-    seen = [np.isfinite(track).all(axis=1, keepdims=True) for track in checked]
-    whole = [np.where(rows, track, np.nan) for rows, track in zip(seen, checked, strict=True)]
+    whole = [np.where(np.isfinite(t).all(axis=1, keepdims=True), t, np.nan) for t in checked]
     return at_once(rig.cameras, whole)
 
 
@@ -557,25 +556,17 @@ def read_calibration(
     size = None if image_size is None else check_image_size(image_size)
     cameras: list[PerspectiveCamera] = []
     warnings: list[str] = []
-    if isinstance(paths, str | os.PathLike) or not isinstance(paths, Iterable):
-        raise ValueError(f"paths: must be a list of files, got {shown(paths)}")
-    for given in paths:
+    for given in check_items("paths", paths, of="file"):
         path = check_file("paths", given, "calibration file")
         content, told = _content(path), list[str]()
         with reading("paths", path):
             found = list(_cameras(content, size, told))
-        warnings += [f"{path.name}: {one}" for one in told]
         if not found:
             raise ValueError(
                 f"paths: must hold a camera matrix (K), DLT coefficients or P, got none in '{path}'"
             )
-        for camera, skew in found:
-            if skew > ROUNDING:
-                warnings.append(
-                    f"cameras[{len(cameras)}] ({path.name}): its pixels are skew, by {skew:.2g} "
-                    "pixels at the edge of the image, which is left out"
-                )
-            cameras.append(camera)
+        cameras += found
+        warnings += [f"{path.name}: {one}" for one in told]
     return Rig(tuple(cameras), tuple(warnings))
 
 
@@ -587,9 +578,9 @@ def _content(path: Path) -> Any:
     if suffix in (".npy", ".npz"):
         return read_arrays("paths", path)
     if suffix in (".csv", ".txt"):
-        text = read_text("paths", path, "a table")
-        with reading("paths", path):
-            return _table_of(text)
+        lines = re.sub("[,;]", " ", read_text("paths", path, "a table")).splitlines()
+        with reading("paths", path, "rows of as many numbers each"):
+            return np.array([line.split() for line in lines if line.strip()], dtype=float)
     raise ValueError(
         "paths: must end in .toml, .yaml, .yml, .xml, .json, .npz, .npy, .csv or .txt, got "
         f"'{path}'"
@@ -598,15 +589,14 @@ def _content(path: Path) -> Any:
 
 def _cameras(
     content: Any, size: tuple[int, int] | None, warnings: list[str]
-) -> Iterator[tuple[PerspectiveCamera, float]]:
-    """The cameras of a file, each with the skew of its pixels."""
+) -> Iterator[PerspectiveCamera]:
+    """The cameras of a file."""
     alone = isinstance(content, np.ndarray)
     for name, table in [("", {"P": content})] if alone else _tables(content, "", warnings):
         try:
-            if "K" in table:
-                yield _from_opencv(table, size), 0.0
-            else:
-                yield from _from_matrices(check_array("P", table["P"]), _size_of(table, size))
+            table["size"] = _size_of(table, size)
+            parts = [table] if "K" in table else _decomposed(table, name, warnings)
+            yield from map(_camera, parts)
         except ValueError as error:
             raise ValueError(f"{name}{error}") from None
 
@@ -656,7 +646,7 @@ def _tables(content: Any, name: str, warnings: list[str]) -> Iterator[tuple[str,
         warnings.append(f"{name}nothing is known of {', '.join(strange):.80}, which is left out")
     stacked = np.ndim(known.get("K", 0)) == 3
     for i in range(len(known["K"]) if stacked else 1):
-        yield name, {key: value[i] if stacked else value for key, value in known.items()}
+        yield name, {key: v[i] if stacked and np.ndim(v) > 1 else v for key, v in known.items()}
 
 
 def _is_set(value: Any) -> bool:
@@ -679,57 +669,46 @@ def _check_lens(key: str, value: Any, name: str, warnings: list[str]) -> None:
         warnings.append(f"{name}{key} = {shown(value)} is taken for a lens {_LENSES}")
 
 
-def _table_of(text: str) -> Floats:
-    """The numbers of a text."""
-    try:
-        lines = text.replace(",", " ").replace(";", " ").splitlines()
-        return np.array([[float(part) for part in line.split()] for line in lines if line.strip()])
-    except ValueError:
-        raise ValueError("must hold rows of as many numbers each and nothing else") from None
-
-
-def _from_matrices(
-    values: Floats, size: tuple[int, int]
-) -> Iterator[tuple[PerspectiveCamera, float]]:
-    """Cameras of DLT coefficients, (11, m), or projection matrices, (3 m, 4) or (m, 3, 4)."""
+def _decomposed(table: dict[str, Any], name: str, warnings: list[str]) -> Iterator[dict[str, Any]]:
+    """K, R and t of P: DLT coefficients, (11, m), or projections, (3 m, 4) or (m, 3, 4)."""
+    values, size = check_array("P", table["P"]), table["size"]
     if not np.isfinite(values).all():
         raise ValueError("must hold finite numbers, got NaN or infinity")
-    if values.ndim == 2 and values.shape[0] == 11:
-        for column in values.T:
-            matrix = np.append(column, 1.0).reshape(3, 4)
-            up = np.linalg.det(matrix[:, :3]) < 0
-            # Pixels from 1, and from the lower left if the image is mirrored.
-            first = [[1, 0, -1], [0, -1, size[1]] if up else [0, 1, -1], [0, 0, 1]]
-            yield _from_projection(np.array(first) @ matrix, size)
-    elif values.ndim in (2, 3) and values.shape[-1] == 4 and values.size % 12 == 0:
-        for matrix in values.reshape(-1, 3, 4):
-            yield _from_projection(matrix * (np.sign(np.linalg.det(matrix[:, :3])) or 1.0), size)
-    else:
+    is_dlt = values.ndim == 2 and len(values) == 11
+    if is_dlt:
+        values = np.vstack((values, np.ones(values.shape[1]))).T
+    elif not (values.ndim in (2, 3) and values.shape[-1] == 4 and values.size % 12 == 0):
         raise ValueError(
             "must hold 11 DLT coefficients per camera, a column each, or matrices of 3 x 4, got "
             f"shape {values.shape}"
         )
+    for i, matrix in enumerate(values.reshape(-1, 3, 4)):
+        mirrored = np.linalg.det(matrix[:, :3]) < 0
+        if is_dlt:
+            # Pixels from 1, and from the lower left if the image is mirrored.
+            first = [[1, 0, -1], [0, -1, size[1]] if mirrored else [0, 1, -1], [0, 0, 1]]
+            matrix = np.array(first) @ matrix
+        elif mirrored:
+            matrix = -matrix
+        if not np.linalg.cond(matrix[:, :3]) < 1e12:
+            raise ValueError("P: must be of a camera at a finite place, got a singular matrix")
+        parts = cv2.decomposeProjectionMatrix(matrix)[:3]
+        inner, rotation, place = (np.asarray(part, float) for part in parts)
+        inner /= inner[2, 2]
+        skew = abs(inner[0, 1] / inner[1, 1]) * size[1] / 2
+        told = f"{skew:.3g} pixels at the edge of the image"
+        if skew > _SKEWED:
+            raise ValueError(f"P: must be of a camera with square corners, got a skew of {told}")
+        if skew > ROUNDING:
+            warnings.append(
+                f"{name or f'camera [{i}]: '}its pixels are skew, by {told}, which is left out"
+            )
+        inner[0, 1] = 0
+        yield {"K": inner, "R": rotation, "t": -rotation @ place[:3, 0] / place[3], "size": size}
 
 
-def _from_projection(matrix: Floats, size: tuple[int, int]) -> tuple[PerspectiveCamera, float]:
-    """The camera of a projection matrix with a positive determinant, and its skew."""
-    if not np.linalg.cond(matrix[:, :3]) < 1e12:
-        raise ValueError("P: must be of a camera at a finite place, got a singular matrix")
-    parts = cv2.decomposeProjectionMatrix(matrix)[:3]
-    inner, rotation, place = (np.asarray(part, float) for part in parts)
-    shift = -rotation @ place[:3, 0] / place[3]
-    inner = inner / inner[2, 2]
-    skew = abs(inner[0, 1] / inner[1, 1]) * size[1] / 2
-    if skew > _SKEWED:
-        raise ValueError(
-            f"P: must be of a camera with square corners, got a skew of {skew:.3g} pixels at the "
-            "edge of the image"
-        )
-    return _camera(inner, np.zeros(0), rotation, shift, size), skew
-
-
-def _from_opencv(table: dict[str, Any], given: tuple[int, int] | None) -> PerspectiveCamera:
-    """The camera of a table with K, R, t, and what else there is."""
+def _camera(table: dict[str, Any]) -> PerspectiveCamera:
+    """The camera of a table with K, R, t, size, and what else there is."""
     for key in ("K", "R", "t"):
         if table.get(key) is None or not np.size(table[key]):
             raise ValueError(f"{key}: must be given ({', '.join(_NAMES[key])}), got none")
@@ -747,10 +726,14 @@ def _from_opencv(table: dict[str, Any], given: tuple[int, int] | None) -> Perspe
         if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-5 or np.linalg.det(rotation) < 0:
             raise ValueError("R: must be a rotation, got a matrix that is none")
     dist = np.trim_zeros(check_array("dist", table.get("dist", [])).ravel(), "b")
-    if dist.size > len(LENS):
-        raise ValueError(f"dist: must be {', '.join(LENS)}, got {dist.size} coefficients")
-    shift = _shaped("t", table["t"], (3,))
-    return _camera(inner, dist, rotation, shift, _size_of(table, given))
+    camera = PerspectiveCamera(
+        scale=1 / inner[0, 0],
+        image_size=table["size"],
+        principal_point=inner[:2, 2],
+        aspect=inner[1, 1] / inner[0, 0],
+        distortion=dist if dist.size else None,
+    )
+    return camera.posed(rotation, _shaped("t", table["t"], (3,)))
 
 
 def _shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
@@ -759,17 +742,3 @@ def _shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
     if array.size != np.prod(shape) or not np.isfinite(array).all():
         raise ValueError(f"{name}: must be finite and of shape {shape}, got {shown(value)}")
     return array.reshape(shape)
-
-
-def _camera(
-    inner: Floats, dist: Floats, rotation: Floats, shift: Floats, size: tuple[int, int]
-) -> PerspectiveCamera:
-    """Ours of K, distortion, R, t."""
-    camera = PerspectiveCamera(
-        scale=1 / inner[0, 0],
-        image_size=size,
-        principal_point=inner[:2, 2],
-        aspect=inner[1, 1] / inner[0, 0],
-        distortion=dist if dist.any() else None,
-    )
-    return camera.posed(rotation, shift)

@@ -273,11 +273,9 @@ class _Videos:
             errors[:, PARTS["readout"]] = 0.0
         errors[1:, LAG] = np.inf
         if loose:
-            ways = np.zeros(errors.shape, bool)
-            for what in ("normal", "angle", "scale"):
-                ways[:, PARTS[what]] = True
+            ways = PARTS["normal"] + PARTS["angle"] + PARTS["scale"]
             # As a hand measures tilts, log scales and angles: three degrees, 5 %.
-            errors[ways & (errors == 0)] = 0.05
+            errors[:, ways] = np.where(errors[:, ways] == 0, 0.05, errors[:, ways])
         return errors
 
     def fitted(self, lags: Floats, rough: bool = False, loose: bool = False) -> Adjustment | None:

@@ -11,6 +11,7 @@ is told, the others are left out.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations, product
 from typing import NamedTuple
@@ -19,7 +20,8 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from .calibrate import learn_cameras
-from .rig import ALIKE, Rig, reconstruct, residuals
+from .models import Camera, at_once, independent, intersect, missed
+from .rig import ALIKE, Rig
 
 _SHORTEST = 4  # frames of a run, and of what two runs have in common
 _NEAR, _NOISE = 2.0, 2.0  # by how much closer, in times and pixels, a target is to where it goes
@@ -53,9 +55,8 @@ class _Run:
 
 def stacked(values: Floats, width: int) -> Floats:
     """Columns side by side, (n, width k), one below the other, with a row of NaN in between."""
-    parts = np.split(values, values.shape[1] // width, axis=1)
-    between = np.full((1, width), np.nan)
-    return np.concatenate([row for part in parts for row in (part, between)][:-1])
+    parts = values.reshape(len(values), values.shape[1] // width, width).swapaxes(0, 1)
+    return np.pad(parts, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan).reshape(-1, width)[:-1]
 
 
 def side_by_side(rows: Floats, count: int) -> Floats:
@@ -105,7 +106,7 @@ def identify(tracks: Sequence[Floats], rig: Rig) -> Identities:
     return Identities(flat, (doubt,))
 
 
-def _parts(groups: Sequence[Sequence[_Run]], cameras: Rig) -> list[list[_Run]]:
+def _parts(groups: Sequence[Sequence[_Run]], cameras: Sequence[Camera]) -> list[list[_Run]]:
     """Groups in one order of the targets, as far as that is sure: each with where it goes on."""
     parts: list[list[_Run]] = []
     for group in groups:
@@ -119,7 +120,7 @@ def _parts(groups: Sequence[Sequence[_Run]], cameras: Rig) -> list[list[_Run]]:
     return parts
 
 
-def _size(part: Sequence[_Run], cameras: Rig) -> tuple[int, int]:
+def _size(part: Sequence[_Run], cameras: Sequence[Camera]) -> tuple[int, int]:
     """How many views have runs of a part, and in how many frames it tells where the targets are."""
     return len({run.view for run in part}), len(_in_space(part, cameras)[0])
 
@@ -138,7 +139,7 @@ def _runs(number: int, view: Floats) -> list[_Run]:
     return [_Run(number, part, view[part]) for part in parts]
 
 
-def _cameras(views: Sequence[Floats], runs: Sequence[_Run], rig: Rig) -> Rig:
+def _cameras(views: Sequence[Floats], runs: Sequence[_Run], rig: Rig) -> tuple[Camera, ...]:
     """The cameras, learned where all views tell all targets apart for longest."""
     which = np.full((len(views[0]), len(views)), -1)
     for number, run in enumerate(runs):
@@ -156,11 +157,9 @@ def _cameras(views: Sequence[Floats], runs: Sequence[_Run], rig: Rig) -> Rig:
     tried = []
     for order in product(orders[:1], *[orders] * (len(views) - 1)):
         here = [place[:, list(o)] for place, o in zip(places, order, strict=True)]
-        try:
-            learned = learn_cameras(_rows(here), rig)
-        except ValueError:
-            continue
-        tried.append((_misfit(here, learned), learned))
+        with suppress(ValueError):
+            learned = learn_cameras(_rows(here), rig).cameras
+            tried.append((_misfit(here, learned), learned))
     tried.sort(key=lambda one: one[0])
     if not tried or (len(tried) > 1 and not tried[0][0] * ALIKE < tried[1][0]):
         sizes = ", ".join(f"{size:.2g}" for size, _ in tried[:2]) or "none"
@@ -176,13 +175,13 @@ def _rows(views: Sequence[Floats]) -> list[Floats]:
     return [stacked(view.reshape(len(view), -1), 2) for view in views]
 
 
-def _misfit(views: Sequence[Floats], cameras: Rig) -> float:
+def _misfit(views: Sequence[Floats], cameras: Sequence[Camera]) -> float:
     """Pixels by which the views typically miss each other."""
-    missed = np.concatenate(residuals(_rows(views), cameras))
-    return float(np.nanmedian(np.hypot(*missed.T)))
+    off = np.concatenate(missed(cameras, at_once(cameras, _rows(views))))
+    return float(np.nanmedian(np.hypot(*off.T)))
 
 
-def _joined(runs: Sequence[_Run], cameras: Rig) -> list[list[_Run]]:
+def _joined(runs: Sequence[_Run], cameras: Sequence[Camera]) -> list[list[_Run]]:
     """Runs in one order of the targets, in groups that nothing joins, in the order of time.
 
     The surest pairs of runs are joined first.
@@ -210,12 +209,12 @@ def _first(runs: Sequence[_Run]) -> int:
     return min(int(run.frames[0]) for run in runs)
 
 
-def _link(one: _Run, other: _Run, cameras: Rig) -> tuple[float, list[int]] | None:
+def _link(one: _Run, other: _Run, cameras: Sequence[Camera]) -> tuple[float, list[int]] | None:
     """How sure it is which order of another view's targets is that of a view, and which one."""
     common = np.intersect1d(one.frames, other.frames, assume_unique=True)
-    if one.view == other.view or len(common) < _SHORTEST:
+    pair = cameras[one.view], cameras[other.view]
+    if not independent(pair) or len(common) < _SHORTEST:
         return None
-    pair = Rig((cameras.cameras[one.view], cameras.cameras[other.view]))
     here, there = one.at(common), other.at(common)
     sure, order = _surest(here.shape[1], lambda o: _misfit([here, there[:, o]], pair))
     return (sure, order) if sure > ALIKE else None
@@ -229,7 +228,9 @@ def _surest(count: int, misfit: Callable[[list[int]], float]) -> tuple[float, li
     return second / max(ranked[0][0], 1e-9), ranked[0][1]
 
 
-def _on_from(before: Sequence[_Run], after: Sequence[_Run], cameras: Rig) -> tuple[list[int], bool]:
+def _on_from(
+    before: Sequence[_Run], after: Sequence[_Run], cameras: Sequence[Camera]
+) -> tuple[list[int], bool]:
     """In which order the targets go on behind a gap in all views, and whether that is sure."""
     start = _first(after)
     there, x = _in_space(before, cameras)
@@ -244,14 +245,14 @@ def _on_from(before: Sequence[_Run], after: Sequence[_Run], cameras: Rig) -> tup
     return order, sure > ALIKE
 
 
-def _in_space(runs: Sequence[_Run], cameras: Rig) -> tuple[Ints, Floats]:
+def _in_space(runs: Sequence[_Run], cameras: Sequence[Camera]) -> tuple[Ints, Floats]:
     """The frames in which two views or more have runs, and the targets' places, (m, k, 3)."""
     n, count = 1 + max(int(run.frames[-1]) for run in runs), runs[0].places.shape[1]
-    views = {run.view: np.full((n, count, 2), np.nan) for run in runs}  # a view may have none
+    views = np.full((len(cameras), n, count, 2), np.nan)
     for run in runs:
-        views[run.view][run.frames] = run.places
-    theirs = Rig(tuple(cameras.cameras[view] for view in views))
-    x = side_by_side(reconstruct(_rows([*views.values()]), theirs), count).reshape(n, count, 3)
+        views[run.view, run.frames] = run.places
+    x, _ = intersect(cameras, at_once(cameras, _rows([*views])))
+    x = side_by_side(x, count).reshape(n, count, 3)
     frames = np.flatnonzero(np.isfinite(x).all(axis=(1, 2)))
     return frames, x[frames]
 

@@ -224,14 +224,11 @@ def _homed(
     cameras: Sequence[PerspectiveCamera], poses: Sequence[_Pose]
 ) -> tuple[PerspectiveCamera, ...]:
     """The cameras at poses of which the first is at home, and the second a unit from it."""
-    home, place = poses[0]
-    turns = [turn @ home.T for turn, _ in poses]
-    shifts = [shift - turn @ place for turn, (_, shift) in zip(turns, poses, strict=True)]
-    unit = np.linalg.norm(shifts[1])
-    return tuple(
-        camera.posed(turn * [1, -1, -1], shift / unit)
-        for camera, turn, shift in zip(cameras, turns, shifts, strict=True)
-    )
+    turns, shifts = map(np.array, zip(*poses, strict=True))
+    turns = turns @ turns[0].T
+    shifts = shifts - turns @ shifts[0]
+    each = zip(cameras, turns * [1, -1, -1], shifts / np.linalg.norm(shifts[1]), strict=True)
+    return tuple(camera.posed(turn, shift) for camera, turn, shift in each)
 
 
 def _mirrored(best: Adjustment, other: Adjustment) -> bool:
@@ -250,15 +247,12 @@ def _framed(rig: Rig, fit: Adjustment, mirrored: bool) -> Rig:
 
     They are as good as measured by eye: what the tracks tell is learned later.
     """
-    cameras, middle = fit.cameras, np.nanmean(fit.points, axis=0)
-    between = np.asarray(cameras[1].position) - np.asarray(cameras[0].position)
-    apart = float(np.linalg.norm(between))
-    unit = (1.0 if rig.distance is None else rig.distance) / apart
-    first, *others = (
-        replace(camera, position=unit * (np.asarray(camera.position) - middle))
-        for camera in cameras
-    )
-    loose = [replace(camera, position_error=unit * apart, normal_error=45.0) for camera in others]
+    distance = 1.0 if rig.distance is None else rig.distance
+    places = np.array([camera.position for camera in fit.cameras]) - np.nanmean(fit.points, axis=0)
+    places *= distance / np.linalg.norm(places[1] - places[0])
+    each = zip(fit.cameras, places, strict=True)
+    first, *others = (replace(camera, position=place) for camera, place in each)
+    loose = [replace(camera, position_error=distance, normal_error=45.0) for camera in others]
     doubts = (_EITHER_HAND,) if mirrored else ()
     return Rig((first, *loose), doubts, _note(rig))
 
@@ -347,18 +341,16 @@ def _best(footage: Footage, rank: int, synchronous: bool) -> tuple[float, Floats
     tried together, and further views one by one. Of those that leave about as little, the
     shortest count.
     """
-    count = len(footage.curves)
-    lags = np.zeros(count)
+    count, lags = len(footage.curves), np.zeros(1)
     if synchronous:
-        return _left(footage, footage.lags, range(count), rank), footage.lags, lags
+        return _left(footage, footage.lags, range(count), rank), footage.lags, np.zeros(count)
     promising = [_promising(footage, i, rank)[:_PROMISING] or [0.0] for i in range(1, count)]
-    for last in range(3, count + 1):
-        tried = []
-        for new in product(*promising[:2]) if last == 3 else product(promising[last - 2]):
-            lags[last - len(new) : last] = new
-            tried.append((_left(footage, lags, range(last), rank), tuple(lags)))
-        found = [_polished(footage, np.array(one), last, rank) for _, one in sorted(tried)[:_LAGS]]
-        left = np.array([_left(footage, one, range(last), rank) for one, _ in found])
+    for further in (product(*promising[:2]), *map(product, promising[2:])):
+        every = [(*lags, *new) for new in further]
+        views = range(len(every[0]))
+        tried = sorted((_left(footage, np.array(late), views, rank), late) for late in every)
+        found = [_polished(footage, np.array(late), rank) for _, late in tried[:_LAGS]]
+        left = np.array([_left(footage, late, views, rank) for late, _ in found])
         alike = np.flatnonzero(left <= max(ALIKE * left.min(), FINE))
         shortest = min(alike, key=lambda k: np.abs(found[k][0]).sum())
         (lags, errors), least = found[shortest], float(left[shortest])
@@ -374,25 +366,26 @@ def _promising(footage: Footage, i: int, rank: int) -> list[float]:
     return dips(tried, np.array([_left(footage, lags, (0, i), rank) for lags in every]))
 
 
-def _polished(footage: Footage, lags: Floats, count: int, rank: int) -> tuple[Floats, Floats]:
-    """The lags of so many views, to fractions of a frame, that leave least near by.
+def _polished(footage: Footage, lags: Floats, rank: int) -> tuple[Floats, Floats]:
+    """The lags of the first views, to fractions of a frame, that leave least near by.
 
     And their standard errors, of errors that may last for many frames, as those of `adjust`.
     """
+
+    count = len(lags)
 
     def beyond(others: Floats) -> Floats:
         late = np.append(0.0, others)
         return np.nan_to_num(_beyond(_images(footage, late, range(count)), rank)).ravel()
 
-    found = least_squares(beyond, lags[1:count], diff_step=1e-3, max_nfev=_STEPS)
+    found = least_squares(beyond, lags[1:], diff_step=1e-3, max_nfev=_STEPS)
     information, errors = found.jac.T @ found.jac, np.full(count - 1, np.inf)
     if np.linalg.cond(information) <= 1 / np.finfo(float).eps:
         each = (found.jac * found.fun[:, None]).reshape(-1, 2 * count, count - 1).sum(axis=1)
         inverse = np.linalg.inv(information)
         together = len(each) * inverse @ long_run_covariance(each) @ inverse
         errors = np.sqrt(np.diag(together))
-    last = np.zeros(len(lags) - count)
-    return np.concatenate(([0.0], found.x, last)), np.concatenate(([0.0], errors, last))
+    return np.append(0.0, found.x), np.append(0.0, errors)
 
 
 def _images(footage: Footage, lags: Floats, places: Sequence[int]) -> Floats:
