@@ -161,6 +161,9 @@ def test_another_function_of_the_same_name_is_refused(pendulum, tmp_path):
     del content["functions"]
     (tmp_path / "old").write_text(json.dumps(content))
     assert vl.Discovery.load(tmp_path / "old", HELD).equations() == pendulum.equations()
+    (tmp_path / "other").write_text(json.dumps(content | {"functions": [1, 2, 3]}))
+    with pytest.raises(ValueError, match="path: must be a file that Discovery.save has written"):
+        vl.Discovery.load(tmp_path / "other", HELD)
 
 
 def test_functions_that_the_law_has_not_may_be_missing(pendulum, tmp_path):

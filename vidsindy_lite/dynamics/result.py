@@ -482,9 +482,10 @@ class Discovery:
         try:
             found = decoded(content["discovery"], _built)
             values = decoded(content.get("functions"), _built)
-            if values is not None:  # of a file of today
-                values = check_array("functions", values)
             _check_shapes(found)
+            if values is not None:  # of a file of today
+                shape = _PLACES, len(found.system.functions)
+                values = check_array("functions", values).reshape(shape)
         except MALFORMED as error:
             raise ValueError(f"{message}: {shown(error)}") from error
         found = _with_functions(found, library, values)
@@ -696,6 +697,7 @@ def _rest(law: Discovery) -> float:
 # A discovery as a text file: JSON in which every number keeps all its digits.
 
 FORMAT = "vidsindy_lite discovery, version 1"
+_PLACES = 20  # on a curve, at which a file holds the values of functions
 TYPES: dict[str, Any] = {
     kind.__name__: kind for kind in (Discovery, PolynomialSystem, Plateau, Step, Swing, Round)
 }
@@ -739,9 +741,9 @@ def _with_functions(
 
 
 def _values(found: Discovery) -> Floats:
-    """What the functions of a law are at 20 places on its curve, (n, k)."""
+    """What the functions of a law are at some places on its curve, (n, k)."""
     d, knots = found.system.d, np.concatenate([curve.t for curve in found.curves])
-    x = found.curve(np.quantile(knots, np.linspace(0, 1, 20), method="nearest"))
+    x = found.curve(np.quantile(knots, np.linspace(0, 1, _PLACES), method="nearest"))
     return extended(x, found.system.functions)[:, d:]
 
 
