@@ -99,7 +99,7 @@ def test_a_full_disk_leaves_the_old_law_and_rig(saved, tmp_path, monkeypatch, ca
             with pytest.raises(OSError, match="No space left"):
                 save(tmp_path / name)
     for command in (["rig-template"], ["rig-import", str(tmp_path / "rig.toml")]):
-        assert main([*command, "--output", str(tmp_path / "rig.toml")]) == 2
+        assert main([*command, "--output", str(tmp_path / "new")]) == 2
     monkeypatch.undo()
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 

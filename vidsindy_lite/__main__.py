@@ -243,8 +243,11 @@ def _write(text: str, output: str | None) -> int:
 
     if output is None:
         print(text, end="")
-    else:
-        write_file(check_output("output", output), text.encode())
+        return 0
+    path = check_output("output", output)
+    if path.is_file():  # perhaps one that was filled in by hand
+        raise ValueError(f"output: must be a new file, got '{path}'")
+    write_file(path, text.encode())
     return 0
 
 

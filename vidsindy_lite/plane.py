@@ -103,7 +103,7 @@ def discover_from_video(
     fps: float | None = None,
     *,
     corners: Sequence[float] | None = None,
-    length_error: float = 0.01,
+    length_error: float | None = None,
     hint: Hint | None = None,
     detector: str | os.PathLike = "auto",
     degree: int | None = None,
@@ -128,9 +128,9 @@ def discover_from_video(
     corners : (u1, v1, ..., u4, v4, width, height), optional
         For a plane that is seen askew: the corners of a rectangle in it, lower left, lower right,
         upper right, upper left, and its sides in metres. The lower left is the origin.
-    length_error : float
-        Standard error of the length or of the sides, as a share of them. That of marks, a pixel
-        each, comes on top.
+    length_error : float, optional
+        Standard error of the length or of the sides, as a share of them; .01 by default. That of
+        marks, a pixel each, comes on top.
     hint, detector
         See ``target`` and ``detector`` of `track`.
     degree, order, seed, progress
@@ -153,9 +153,13 @@ def discover_from_video(
     """
     check_detector(detector)
     asked = law_options(degree, None, order, "learn", "data", seed, progress, 2)
-    share = check_number("length_error", length_error)
+    if length_error is not None and length is None and corners is None:
+        raise ValueError("length_error: must be given with length or corners, got neither")
+    share = 0.01 if length_error is None else check_number("length_error", length_error)
     if not 0 <= share < 1:
-        raise ValueError(f"length_error: must be a share of the length, 0 to 1, got {share}")
+        raise ValueError(
+            f"length_error: must be a share of the length, from 0 to below 1, got {share}"
+        )
     shot, name = video_info(path), Path(path).name
     if fps is None and not shot.fps:
         raise ValueError(f"fps: must be given, as {name} states no frame rate")

@@ -166,11 +166,14 @@ def test_the_command_line(tmp_path, capsys):
     assert_same(vl.Rig.load(tmp_path / "again.toml"), parts)
     assert main(["rig-template", "--output", str(tmp_path / "t.toml")]) == 0
     assert len(vl.Rig.load(tmp_path / "t.toml").cameras) == 3
-    there = str(tmp_path / "none" / "b.toml")
-    told = f"error: output: must be a file in a folder that exists, got '{there}'"
-    for command in (["rig-template"], ["rig-import", str(tmp_path / "a.toml")]):
-        assert main([*command, "--output", there]) == 2
-        assert capsys.readouterr().err.splitlines() == [told]
+    before = (tmp_path / "a.toml").read_text("utf-8")
+    for place, rule in (("none/b.toml", "file in a folder that exists"), ("a.toml", "new file")):
+        there = str(tmp_path / place)
+        for command in (["rig-template"], ["rig-import", str(tmp_path / "a.toml")]):
+            assert main([*command, "--output", there]) == 2
+            told = f"error: output: must be a {rule}, got '{there}'"
+            assert capsys.readouterr().err.splitlines() == [told]
+    assert (tmp_path / "a.toml").read_text("utf-8") == before
 
 
 @pytest.mark.parametrize(

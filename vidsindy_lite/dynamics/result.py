@@ -760,8 +760,9 @@ def _check_shapes(found: Any) -> None:
         raise ValueError(f"it must hold a Discovery, got {type(found).__name__}")
     d, here, native = found.system.d, *(len(law.exponents) for law in (found.system, found.native))
     shapes = {
-        "offset": (d,), "offset_errors": (d,), "covariance": (here * d, here * d),
-        "native_covariance": (native * d, native * d), "absent": (native, d, 2),
+        "offset": (d,), "offset_errors": (d,), "noise": (d,), "model_error": (d,),
+        "covariance": (here * d, here * d), "native_covariance": (native * d, native * d),
+        "absent": (native, d, 2),
     }  # fmt: skip
     for name, shape in shapes.items():
         if getattr(found, name).shape != shape:

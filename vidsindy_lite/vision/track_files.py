@@ -190,6 +190,12 @@ def _tracks(
     if heads[0][:1] == ["scorer"] and not np.isfinite(columns["frame"]).all():
         del columns["frame"]  # these are names of images
     told = [m for known in _SERIES for key in columns if (m := known.fullmatch(key))]
+    if (
+        individual is not None
+        and who is None
+        and not any(m.groupdict().get("target") for m in told)
+    ):
+        raise ValueError(f"must name its targets, of which individual is one, got {individual!r}")
     if any(match["axis"] in "uvxy" for match in told):
         return _of_series(name, columns, told, individual, lenient=who is not None)
     return [_track(name, columns, of_world=units is None and _is_of_tracker(header))]
