@@ -238,6 +238,11 @@ def test_what_is_there_or_is_no_candidate_has_no_interval():
 
 def test_only_data_that_tell_little_leave_terms_unseen():
     assert "not seen" not in str(found_in(weak_spring(), 0))
+    # In the frame in which a body cools down to 0 a constant is the same law around elsewhere.
+    t, rng = np.linspace(0, 20, 200), np.random.default_rng(0)
+    found = vl.discover(t, 20 + 60 * np.exp(-0.2 * t)[:, None] + 0.3 * rng.normal(size=(200, 1)))
+    assert np.isinf(found.absent).any()
+    assert "not seen" not in str(found)
     t = TURNS[:30]  # half a turn
     x = weak_spring().simulate(t, (1.0, 0.0)) + 0.02 * np.random.default_rng(0).normal(size=(30, 2))
     short = vl.discover(t, x, degree=2)

@@ -539,12 +539,14 @@ def unseen(
 ) -> Iterator[str]:
     """Absent terms that may make more of a slope than one of the law does, the largest first.
 
-    How much a term makes of a slope is its root mean square along the curve.
+    How much a term makes of a slope is its root mean square along the curve. Where the origin was
+    moved, a term of any size is what a further move makes up for: the same law in another frame.
     """
     x = np.concatenate([curve(np.unique(curve.t)) for curve in curves]) - offset
     size = np.sqrt((law.library(x) ** 2).mean(axis=0))[:, None]
     own = np.where(law.support, size * np.abs(law.coefficients), np.inf).min(axis=0)
-    most = np.nan_to_num(np.abs(absent).max(axis=2), nan=0.0, posinf=np.inf)
+    endless = 0.0 if offset.any() else np.inf
+    most = np.nan_to_num(np.abs(absent).max(axis=2), nan=0.0, posinf=endless)
     with np.errstate(invalid="ignore"):  # of an equation without terms
         reach = size * most / own
     for entry in np.argsort(-reach, axis=None, kind="stable")[: int((reach > 1).sum())].tolist():
