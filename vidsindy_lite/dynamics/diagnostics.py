@@ -184,10 +184,10 @@ def _closed(t: Floats, x: Floats, noise: Floats, terms: Ints, most: int = 3000) 
             scant = np.flatnonzero(numbers <= terms + 1)
             if len(scant):
                 yield (
-                    f"the motion repeats one closed orbit (period {period:.4g}) of which the data "
-                    f"tell {numbers[scant[0]]} numbers, where a law has {terms[scant[0]]} "
-                    "coefficients: what it says off this orbit is not tested; add runs from other "
-                    "starts"
+                    f"the motion repeats one closed orbit (period {period:.4g}), which tells as "
+                    f"many numbers ({numbers[scant[0]]}) as a law has coefficients "
+                    f"({terms[scant[0]]}), or hardly more: what the law says off this orbit is not "
+                    "tested; add runs from other starts"
                 )
             return
 
