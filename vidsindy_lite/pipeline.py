@@ -155,6 +155,11 @@ def observe(
     count = None if rig is None else len(rig.cameras)
     each = enumerate(check_items("paths", paths, count, "camera of the rig"))
     files = [check_path(f"paths[{i}]", path) for i, path in each]
+    for path in files:
+        if (times := files.count(path)) > 1:
+            raise ValueError(
+                f"paths: must be another video for each camera, got '{path}' {times} times"
+            )
     given = [None] * len(files) if hints is None else hints
     hints = check_items("hints", given, len(files), "video")
     if targets > 1:
