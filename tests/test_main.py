@@ -62,7 +62,7 @@ def here(folder, tmp_path, monkeypatch):
         (["--rig", "rig.toml", "--out", "/proc/law"], "out: the folder around it must be "),
         (["--rig", "rig.toml", "--seed", "x"], "seed: must be an integer, got 'x'"),
         (["--rig", "rig.toml", "--loud"], "unrecognized arguments: --loud"),
-        (["--rig", "rig.toml", "--individual", "a"], "individual: must be given with --tracks, go"),
+        (["--rig", "rig.toml", "--individual", "a"], "individual: must be given with one camera"),
         (
             ["--rig", "rig.toml", "--degree", "2", "--library", "fourier(1)"],
             "degree: must not be given with a library, got 2 and fourier(1)",

@@ -226,6 +226,35 @@ def test_a_wrong_length_and_a_wrong_vertical_are_told(monkeypatch):
     assert "degrees off the vertical of the picture" in vertical
 
 
+def test_a_table_of_the_track_and_the_frames_that_count(tmp_path, capsys):
+    x = flight()[1]
+    x = noisy(np.repeat(x, [25, *[1] * (len(x) - 2), 20], axis=0), 0)
+    rows = np.column_stack([100 + np.arange(len(x)), pixels_of(x)])
+    table, law = tmp_path / "throw.csv", tmp_path / "law"
+    np.savetxt(table, rows, "%.4f", ",", header="frame,u,v", comments="")
+    found = vl.discover_from_video(table, STICK, fps=30)
+    assert found.warnings[-1].startswith("frames: all were taken to be of one motion")
+    given = ["--length", ",".join(map(str, STICK))]
+    command = ["discover", "--tracks", str(table), "--fps", "30", *given, "--out", str(law)]
+    assert main([*command, "--frames", "124,157"]) == 0
+    data = json.loads((law / "result.json").read_text("utf-8"))
+    assert abs(data["g"]["value"] - 9.81) < 2 * data["g"]["error"] < 0.9
+    assert "places in m, times in s" in data["frame"]
+    # What a run leaves is read again.
+    assert main(["discover", "--tracks", str(law / "tracks.csv"), *given, "--out", str(law)]) == 0
+    assert json.loads((law / "result.json").read_text("utf-8"))["g"] == data["g"]
+    capsys.readouterr()
+    for frames in ("125,9", "25,58", "125,1000", "124.5,157"):
+        assert main([*command, "--frames", frames]) == 2
+        assert "frames: must be the first and the last that count" in capsys.readouterr().err
+    for wrong in ({"hint": vl.Hint(frame=3, box=(1, 1, 9, 9))}, {"detector": "learned"}):
+        with pytest.raises(ValueError, match="hint and detector with a film, got throw.csv"):
+            vl.discover_from_video(table, STICK, **wrong)
+    table.write_text("u1,v1,u2,v2\n1,2,3,4\n5,6,7,9\n")
+    with pytest.raises(ValueError, match="path: must hold the track of one camera, .* 2 cameras"):
+        vl.discover_from_video(table, STICK, fps=30)
+
+
 def test_a_path_that_recedes_looks_like_drag(monkeypatch):
     filmed(monkeypatch, pixels_of(noisy(flight(drag=0.6)[1], 0)))
     (doubt,) = vl.discover_from_video("throw.mp4", STICK).warnings
@@ -280,9 +309,12 @@ def test_an_interruption_keeps_the_track(monkeypatch, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (["b.mov"], "rig: must be given for tracks or two videos, got none"),
+        (["b.mov"], "rig: must be given for several tracks or two videos, got"),
         (["--targets", "2"], "targets: must be given with several videos, got 2"),
-        (["--up", "0,-1", "--rig", "rig.toml"], "up: must be given with one video alone, got [0.0"),
+        (
+            ["--up", "0,-1", "--rig", "rig.toml"],
+            "up: must be given with one camera alone, got [0.0",
+        ),
     ],
 )
 def test_what_does_not_go_together_is_refused(tmp_path, monkeypatch, capsys, given, message):

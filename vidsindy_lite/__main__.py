@@ -134,10 +134,12 @@ def _discover(options: argparse.Namespace) -> int:
     if bool(options.videos) == bool(options.tracks):
         raise ValueError("videos: give either one video per camera, or --tracks")
     check_folder_is_free(options.out)
-    if options.rig is None and len(options.videos) in (0, 2):
-        raise ValueError("rig: must be given for tracks or two videos, got none")
-    alone = options.rig is None and len(options.videos) == 1
-    kind = "--tracks" if options.tracks else "one video alone" if alone else "several videos"
+    given = options.tracks or options.videos
+    alone = options.rig is None and len(given) == 1
+    if options.rig is None and not alone and (options.tracks or len(given) == 2):
+        raise ValueError("rig: must be given for several tracks or two videos, got none")
+    several = "--tracks and a rig" if options.tracks else "several videos"
+    kind = "one camera alone" if alone else several
     asked = {name: getattr(options, name) for name in options.kinds[kind]}
     for name in sum(options.kinds.values(), []):
         if name not in asked and (value := getattr(options, name)) != options.usual(name):
@@ -181,13 +183,13 @@ def _found(options: argparse.Namespace, rig: Any, kind: str, asked: dict[str, An
 
     if options.order != "auto":
         asked["order"] = int(options.order)
-    if kind == "--tracks":
+    if kind == "--tracks and a rig":
         return discover_from_tracks(options.tracks, rig, **asked)
-    if kind == "one video alone":
-        if options.hint is not None:
+    if kind == "one camera alone":
+        if asked.get("hint") is not None:
             frame, *box = check_vector("hint", options.hint, 5).tolist()
             asked["hint"] = Hint(frame=frame if frame % 1 else int(frame), box=tuple(box))
-        return discover_from_video(options.videos[0], **asked)
+        return discover_from_video((options.tracks or options.videos)[0], **asked)
     fps, t = asked.pop("fps"), None
     if fps is not None:
         t = frame_clock(options.videos[0]) / check_positive("fps", fps)

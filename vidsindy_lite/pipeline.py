@@ -672,7 +672,7 @@ def discover_from_tracks(
     check_instance("rig", rig, Rig)
     read = _read(tracks, rig, individual)
     names, pixels = [track.name for track in read], [track.pixels for track in read]
-    times, doubts = _times(read, t, fps)
+    times, doubts = times_of(read, t, fps)
     seen = observe_tracks(pixels, rig, times, lags=lags, names=names, progress=progress)
     doubts = [*(warning for track in read for warning in track.warnings), *doubts]
     seen = replace(seen, warnings=(*seen.warnings, *doubts))
@@ -734,7 +734,7 @@ def _read(
     return read  # another number of tracks than of cameras is refused where they are observed
 
 
-def _times(
+def times_of(
     read: Sequence[TrackFile], t: ArrayLike | Sequence[ArrayLike] | None, fps: float | None
 ) -> tuple[ArrayLike | Sequence[ArrayLike], list[str]]:
     """The times that are given, or those that files state; and which files contradict them."""

@@ -7,7 +7,7 @@ one before it, the simplest is taken that the data bear: forces that are the sam
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -18,8 +18,8 @@ from .arrays import Floats
 from .cameras import Lags, OrthographicCamera, Rig
 from .checks import check_array, check_number, check_positive, check_vector, shown
 from .dynamics import Discovery, Round, Swing, discover, homogeneous, on_circle, smooth
-from .pipeline import VideoDiscovery, check_found, law_options, refusing, tracked
-from .vision import Hint, check_detector, frame_clock, video_info
+from .pipeline import VideoDiscovery, check_found, law_options, refusing, times_of, tracked
+from .vision import Hint, check_detector, frame_clock, read_tracks, video_info
 
 MARK = 1.0
 """Standard error of a mark that is set by hand, in pixels."""
@@ -35,6 +35,8 @@ FOCAL = 0.75
 """Focal length of a telephone over the longer side of its picture."""
 ASIDE = 5.0
 """Spread across a line, over the noise, up to which a motion is one along it."""
+TABLES = (".csv", ".tsv", ".txt", ".xml", ".dat")
+"""How the names of files end that hold a track."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -104,6 +106,8 @@ def discover_from_video(
     *,
     corners: Sequence[float] | None = None,
     length_error: float | None = None,
+    frames: Sequence[int] | None = None,
+    individual: str | None = None,
     hint: Hint | None = None,
     detector: str | os.PathLike = "auto",
     degree: int | None = None,
@@ -116,7 +120,8 @@ def discover_from_video(
     Parameters
     ----------
     path : path
-        A film, see `track`. Marks are in pixels of its first frame.
+        A film, see `track`, or a text file of the target's track in it, see `discover_from_tracks`.
+        Marks are in pixels of its first frame.
     length : (u1, v1, u2, v2, metres), optional
         Two marks, and how far they are apart in the plane of the motion; the first is its origin.
         Without it, and without corners, places are in pixels from the lower left of the picture.
@@ -124,15 +129,20 @@ def discover_from_video(
         The vertical, as a direction in the picture or by two marks, the lower one first; by default
         that of the picture.
     fps : float, optional
-        Frames in one second, where the file does not say so: slow motion.
+        Frames in one second, where the file does not say so: slow motion, tracks without times.
     corners : (u1, v1, ..., u4, v4, width, height), optional
         For a plane that is seen askew: the corners of a rectangle in it, lower left, lower right,
         upper right, upper left, and its sides in metres. The lower left is the origin.
     length_error : float, optional
         Standard error of the length or of the sides, as a share of them; .01 by default. That of
         marks, a pixel each, comes on top.
+    frames : (first, last), optional
+        What counts of the film, from 0 and both included: the target may be in a hand before, or on
+        the ground after that.
+    individual : str, optional
+        Which of several targets of a text file; see `read_tracks`.
     hint, detector
-        See ``target`` and ``detector`` of `track`.
+        Of a film: see ``target`` and ``detector`` of `track`.
     degree, order, seed, progress
         See `discover`. By default, of nested laws the simplest that the data bear: forces that are
         the same at every place, linear ones, a swing on a circle.
@@ -160,37 +170,93 @@ def discover_from_video(
         raise ValueError(
             f"length_error: must be a share of the length, from 0 to below 1, got {share}"
         )
-    shot, name = video_info(path), Path(path).name
-    if fps is None and not shot.fps:
-        raise ValueError(f"fps: must be given, as {name} states no frame rate")
-    rate = shot.fps if fps is None else check_positive("fps", fps)
-    marks, places, pixels = four_places(length, up, corners, shot.size)
+    name, table = Path(path).name, Path(path).suffix.lower() in TABLES
+    if individual is not None if not table else (hint is not None or detector != "auto"):
+        raise ValueError(
+            "individual: must be given with a text file of tracks alone, hint and detector with a "
+            f"film, got {name}"
+        )
+    size, look = _table(path, fps, individual) if table else _film(path, fps, hint, detector)
+    marks, places, measured = four_places(length, up, corners, size, within=not table)
     to_plane = homography_of(marks, places)
-    error = float(np.hypot(share, np.sqrt(2) * MARK / pixels)) if pixels else 0.0
-    unit, scale = ("m", f", their scale known to {100 * error:.2g} %") if pixels else ("px", "")
-    middle, centre = marks.mean(axis=0), (np.array(shot.size) - 1) / 2
+    error = float(np.hypot(share, np.sqrt(2) * MARK / measured)) if measured else 0.0
+    unit, scale = ("m", f", their scale known to {100 * error:.2g} %") if measured else ("px", "")
+    middle, centre = marks.mean(axis=0), (np.array(size) - 1) / 2
     across = complex(*np.diff(mapped(to_plane, middle + [[0.0, 0], [1, 0]]), axis=0)[0])
     camera = PlaneCamera(
         homography=to_plane, position=_in_space(mapped(to_plane, centre[None]))[0],
         normal=np.array([0, 0, 1]), scale=abs(across), angle=-float(np.angle(across)),
-        scale_error=error, image_size=shot.size,
+        scale_error=error, image_size=size,
     )  # fmt: skip
-    rig = Rig((camera,), note=f"the plane of the motion, places in {unit}{scale}")
-    (seen,) = tracked(Path(path), shot.frames, detector, hint)
-    check_found([seen.pixels], [name], 1)
-    t, x = frame_clock(path) / rate, mapped(to_plane, seen.pixels)
-    known = slice(3 if corners is None else 1) if pixels else slice(0)
-    modes = np.stack([error * x, *_tilts(camera, seen.pixels, middle)])[known]
-    with refusing("law", [seen.pixels], [name]):
+    rig = Rig((camera,), note=f"the plane of the motion, places in {unit}, times in s{scale}")
+    t, pixels, first, warnings = look()
+    if frames is not None:
+        pixels = _between(frames, pixels, first)
+    check_found([pixels], [name], 1)
+    x = mapped(to_plane, pixels)
+    known = slice(3 if corners is None else 1) if measured else slice(0)
+    modes = np.stack([error * x, *_tilts(camera, pixels, middle)])[known]
+    with refusing("law", [pixels], [name]):
         law, circle = _law(t, x, modes, asked)
     doubts = law.warnings if circle is None else (*circle.warnings, *law.warnings)
     found = PlaneDiscovery(
-        tracks=(seen.pixels,), rig=rig, lags=Lags(np.zeros(1), np.ones(1), np.zeros(1), 0.0),
+        tracks=(pixels,), rig=rig, lags=Lags(np.zeros(1), np.ones(1), np.zeros(1), 0.0),
         t=t, x=_in_space(x), systematic=np.pad(modes, ((0, 0), (0, 0), (0, 1))),
         warnings=(), discovery=law, unit=unit, circle=circle,
     )  # fmt: skip
     contradicted = _contradicted(found, up is not None or corners is not None, corners is None)
-    return replace(found, warnings=(*seen.warnings, *doubts, *contradicted))
+    if doubts and frames is None:
+        contradicted.append(
+            "frames: all were taken to be of one motion: if it begins in a hand or ends on the "
+            "ground, give the first and the last frame that count"
+        )
+    return replace(found, warnings=(*warnings, *doubts, *contradicted))
+
+
+Seen = tuple[Floats, Floats, int, Sequence[str]]
+"""Times, pixels, the number of the first frame, and doubts."""
+
+
+def _film(
+    path: str | os.PathLike, fps: float | None, hint: Hint | None, detector: str | os.PathLike
+) -> tuple[tuple[int, int], Callable[[], Seen]]:
+    """The size of a film's pictures, and what tracks the target in it."""
+    shot = video_info(path)
+    if fps is None and not shot.fps:
+        raise ValueError(f"fps: must be given, as {Path(path).name} states no frame rate")
+    rate = shot.fps if fps is None else check_positive("fps", fps)
+
+    def look() -> Seen:
+        (seen,) = tracked(Path(path), shot.frames, detector, hint)
+        return frame_clock(path) / rate, seen.pixels, 0, seen.warnings
+
+    return shot.size, look
+
+
+def _table(
+    path: str | os.PathLike, fps: float | None, individual: str | None
+) -> tuple[tuple[int, int], Callable[[], Seen]]:
+    """The size of the smallest picture that holds a track in a text file, and what gives it."""
+    read = read_tracks(path, individual)
+    if len(read) > 1 or read[0].upwards:
+        got = f"{len(read)} cameras" if len(read) > 1 else "one that counts v from below"
+        raise ValueError(f"path: must hold the track of one camera, v downwards, got {got}")
+    (track,), (times, doubts) = read, times_of(read, None, fps)
+    width, height = (int(most) + 1 for most in np.fmax.reduce(track.pixels, axis=0, initial=0.0))
+    t, warnings = np.array(times, float)[0], (*track.warnings, *doubts)
+    return (width, height), lambda: (t, track.pixels, track.start, warnings)
+
+
+def _between(frames: Sequence[int], pixels: Floats, start: int) -> Floats:
+    """A track that starts at some frame, not seen but from the first to the last of two frames."""
+    first, last = check_vector("frames", frames, 2).tolist()
+    number = start + np.arange(len(pixels))[:, None]
+    if not (first % 1 == last % 1 == 0 and number[0] <= first < last <= number[-1]):
+        raise ValueError(
+            "frames: must be the first and the last that count, integers from "
+            f"{start} to {start + len(pixels) - 1}, got {first:g}, {last:g}"
+        )
+    return np.where((number >= first) & (number <= last), pixels, np.nan)
 
 
 def _in_space(places: Floats) -> Floats:
@@ -203,17 +269,19 @@ def four_places(
     up: Sequence[float] | None,
     corners: Sequence[float] | None,
     size: tuple[int, int],
+    within: bool = True,
 ) -> tuple[Floats, Floats, float]:
     """Four pixels and where they are in the plane, (4, 2) each.
 
-    And the pixels that their distances were measured on, 0 if there are none.
+    And the pixels that their distances were measured on, 0 if there are none. The marks have to lie
+    within a picture of that size, or it is the least that holds the motion.
     """
     upwards, square = _upwards(up), np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
     if corners is not None:
         if length is not None:
             raise ValueError("corners: must not be given with length, got both")
         given = check_vector("corners", corners, 10)
-        marks, places = _in_picture("corners", given[:8], size), square * given[8:]
+        marks, places = _in_picture("corners", given[:8], size, within), square * given[8:]
         edges = np.roll(marks, -1, axis=0) - marks
         turns = edges[:, 0] * np.roll(edges[:, 1], -1) - edges[:, 1] * np.roll(edges[:, 0], -1)
         if not ((turns < 0).all() and given[8:].min() > 0):  # v points down
@@ -230,7 +298,7 @@ def four_places(
     metres, pixels = 1.0, 0.0
     if length is not None:
         told = check_vector("length", length, 5)
-        ends, metres = _in_picture("length", told[:4], size), float(told[4])
+        ends, metres = _in_picture("length", told[:4], size, within), float(told[4])
         origin, middle, pixels = ends[0], ends.mean(axis=0), float(np.hypot(*(ends[1] - ends[0])))
         if not (pixels > 2 * MARK and metres > 0):
             raise ValueError(
@@ -242,10 +310,10 @@ def four_places(
     return marks, scale * (marks - origin) @ axes.T, pixels
 
 
-def _in_picture(name: str, given: Floats, size: tuple[int, int]) -> Floats:
-    """Marks, (n, 2), which are checked to lie in the picture."""
+def _in_picture(name: str, given: Floats, size: tuple[int, int], within: bool) -> Floats:
+    """Marks, (n, 2), which are checked to lie within the picture."""
     marks = given.reshape(-1, 2)
-    if not ((marks >= 0) & (marks <= size)).all():
+    if within and not ((marks >= 0) & (marks <= size)).all():
         raise ValueError(
             f"{name}: marks must lie in the picture, {size[0]} x {size[1]}, got {marks.tolist()}"
         )
@@ -349,6 +417,7 @@ def _contradicted(found: PlaneDiscovery, vertical: bool, askew: bool) -> list[st
         error, whose = (TILTED, "that was given") if vertical else (HELD, "of the picture")
         if abs(tilt) > SURE * np.hypot(float(pull.error[0]), error):
             doubts.append(
-                f"up: the pull is {np.rad2deg(tilt):.3g} degrees off the vertical {whose}"
+                f"up: the pull is {np.rad2deg(tilt):.3g} degrees off the vertical {whose}: if a "
+                "slope bears it, it is no g"
             )
     return doubts

@@ -116,6 +116,7 @@ def test_the_energy_along_the_path():
         (law_of(DRY, x={"x": -1.0, "sign(vx)": -0.1}), [1, 0], "or a force jumps there: no spring"),
         (law_of(x={"x": -1.0, "vx": -3.0}), [1, 0], "no period: it creeps back"),
         (law_of(x={"x": -1.0, "vx": 0.1}), [1, 0], "no period: what is near rest leaves it"),
+        (law_of(x={"x": -4.0, "x^3": 1.0}), [1, 0], "of small swings, if its powers imitate no"),
         (law_of(x={"vx": -1.0}), [0, 1], "no constant force: no g"),
         (law_of(x={"vy": 1.0}, y={"vx": -1.0, "1": 1.0}), [0, 0, 0, 1], "turns the motion"),
     ],

@@ -277,6 +277,7 @@ def summary(found: VideoDiscovery, paths: Videos, options: Options = None) -> di
         "format": FORMAT,
         "status": found.status,
         "warnings": found.warnings,
+        "frame": found.rig.note,
         "law": {
             "data": _law(law, "data"),
             "native": _law(law, "native"),

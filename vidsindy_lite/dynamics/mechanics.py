@@ -30,6 +30,9 @@ FAINT = 1e-6
 POINTS = 1001
 """Points of a curve at which forces and energy are looked at."""
 
+IMITATED = "if its powers imitate no other force, as cubics do a sine"
+"""When numbers of small swings, of which a law with powers was fitted to large ones, are right."""
+
 Complexes = NDArray[np.complex128]
 
 
@@ -99,7 +102,8 @@ class Physics:
         named = ("g", "direction", "drag", "quadratic drag")
         said = [str(q) for q in self if q.name.startswith(named)]
         if periods := [str(q) for q in self if q.name.startswith("period")]:
-            said.append(f"of small swings: {'; '.join(periods)}")
+            supposed = f" ({IMITATED})" if any(IMITATED in note for note in self.notes) else ""
+            said.append(f"of small swings{supposed}: {'; '.join(periods)}")
         return "; ".join(said)
 
     def __str__(self) -> str:
@@ -341,6 +345,9 @@ class _Body:
             return said
 
         yield from (Quantity.of(name, *values) for name, values in self.carried(rule).items())
+        powers = self.law.exponents[self.law.support.any(axis=1), : self.m].sum(axis=1)
+        if self.law.is_polynomial and powers.max() > 1:
+            yield f"of small swings, {IMITATED}: else name that with library="
         for j in np.flatnonzero(~swings).tolist():
             why = "what is near rest leaves it" if leaves[j] else "it creeps back to rest"
             yield f"no period{labels[j]}: {why}"
