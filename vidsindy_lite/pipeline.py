@@ -265,15 +265,16 @@ def _observed(
     affine = None
     if not rig.is_measured:
         with refusing("cameras", raw, names):
-            far = cameras.factorised(films, rig, lags is not None)
+            far, most = cameras.factorised(films, rig, lags is not None), cameras.GROSS
             if far is not None:
                 tracks = replace(films, lags=far.lags.frames).aligned
                 warnings = (*far.lags.warnings, *doubts)
                 affine = _concluded(raw, tracks, far.rig, far.lags, clock, [], warnings, far.moving)
-                if far.moving == 1:  # a line tells of no lens
+                if far.moving < 3:  # what parallel projections see of a plane tells of no lens
                     return affine
+                most = max(cameras.BETTER * far.lags.residual, cameras.DISAGREEMENT / 2)
             try:
-                rig = cameras.posed(films.aligned, rig, lags is not None)
+                rig = cameras.posed(films.aligned, rig, lags is not None, min(most, cameras.GROSS))
             except ValueError:
                 if affine is None:
                     raise

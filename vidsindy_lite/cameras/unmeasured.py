@@ -61,7 +61,9 @@ _NOTE = (
 )
 
 
-def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True) -> Rig:
+def posed(
+    tracks: Sequence[Floats], rig: Rig, synchronous: bool = True, most: float = GROSS
+) -> Rig:
     """The rig with places and directions found from tracks, if it has none.
 
     Parameters
@@ -72,6 +74,8 @@ def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True) -> Rig:
         See `Rig.is_measured`.
     synchronous : bool
         ... or but for small lags, which are then learned as well, and forgotten.
+    most : float
+        By how many pixels views may be apart.
 
     Raises
     ------
@@ -95,7 +99,7 @@ def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True) -> Rig:
         if np.isfinite(fit.misses).any():
             fits.append(fit)
     best = min(fits, key=lambda fit: fit.noise, default=None)
-    if best is None or best.noise > GROSS:
+    if best is None or best.noise > most:
         left = "no start" if best is None else f"views that are {best.noise:.1f} pixels apart"
         raise ValueError(
             "rig: the tracks must tell where the cameras stand, as nothing of it is measured, got "
