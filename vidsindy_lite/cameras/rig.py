@@ -415,14 +415,13 @@ def check_calibrated(name: str, rig: Rig) -> None:
     """That scale, angle and position of all cameras are known."""
     check_instance(name, rig, Rig)
     for i, camera in enumerate(rig.cameras):
-        known = {"scale and angle": camera.is_calibrated, "position": camera.is_placed}
-        for what, given in known.items():
-            if not given:
-                raise ValueError(
-                    f"{name}: all cameras must be calibrated and placed, got cameras[{i}] without "
-                    f"{what}; learn_cameras finds them, as the command discover does, which writes "
-                    "them to rig.toml in its report"
-                )
+        if not (camera.is_calibrated and camera.is_placed):
+            what = "position" if camera.is_calibrated else "scale and angle"
+            raise ValueError(
+                f"{name}: all cameras must be calibrated and placed, got cameras[{i}] without "
+                f"{what}; learn_cameras finds them, as the command discover does, which writes "
+                "them to rig.toml in its report"
+            )
 
 
 def rig_template(

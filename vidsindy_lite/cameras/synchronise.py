@@ -236,16 +236,18 @@ def learn_lags(
     """
     check_learnable(rig)
     tracks = check_seen(tracks, rig)
-    first = check_lags("start", start, len(tracks))
-    footage = Footage.of(tracks, None, rates, clocks)
-    rig = posed(replace(footage, lags=first).aligned, rig, synchronous=False)
+    footage = Footage.of(tracks, check_lags("start", start, len(tracks)), rates, clocks)
+    rig = posed(footage.aligned, rig, synchronous=False)
     with bar(progress, "synchronise", unit="fit") as shown:
-        return replace(_learned(_Videos.of(footage, rig, shown), first), clocks=footage.uneven)
+        return replace(_learned(_Videos.of(footage, rig, shown)), clocks=footage.uneven)
 
 
 @dataclass(frozen=True, eq=False)
 class _Videos:
-    """The tracks as functions of time, what is known of the cameras, and a bar to move, if any."""
+    """The tracks as functions of time, what is known of the cameras, and a bar to move, if any.
+
+    The lags of `given` are tried first.
+    """
 
     given: Footage
     known: tuple[Camera, ...]
@@ -256,7 +258,7 @@ class _Videos:
         """Of footage as it is given, with its shutters."""
         still = at_once(rig.cameras, given.tracks)
         instant = tuple(replace(camera, readout=0.0) for camera in rig.cameras)
-        return cls(Footage.of(still, None, given.rates, given.clocks), instant, shown)
+        return cls(Footage.of(still, given.lags, given.rates, given.clocks), instant, shown)
 
     def cameras(self, footage: Footage) -> tuple[Camera, ...] | None:
         """Those that the closed form finds; None if it finds none."""
@@ -294,26 +296,27 @@ class _Videos:
 # ------------------------------------------------------------------------------------- the search
 
 
-def _learned(videos: _Videos, first: Floats) -> Lags:
+def _learned(videos: _Videos) -> Lags:
     """`learn_lags` of what was checked."""
+    first = videos.given.lags
     begun = videos.fitted(first)
     if begun is not None and agrees(begun) and (near(begun, first) or not shares(begun).all()):
-        return _told(videos, drifted(begun), first)
-    loose, sampled = _searched(videos, first)
+        return _told(videos, drifted(begun))
+    loose, sampled = _searched(videos)
     close = [s for s in sampled if score(s) <= max(2 * ALIKE * score(sampled[0]), FINE)]
     small = sorted(close, key=_moved)
     chosen = _different(close[:_SHOWN] + small[:_SHOWN])
     every = [videos.fitted(s.footage.lags, loose=loose) for s in chosen]
     found = sorted(_different([f for f in every if f]), key=score)
     if not found:
-        return _untold(videos, first, False)
+        return _untold(videos, False)
     if not agrees(found[0]):  # as no lag does, where clocks drift by more than a part of a frame
         found = sorted(map(drifted, found), key=score)
     alike = [f for f in found if score(f) <= max(ALIKE * score(found[0]), FINE)]
     if len(alike) > 1 and score(found[0]) > DISAGREEMENT:
-        return _untold(videos, first, False)
+        return _untold(videos, False)
     best = min(alike, key=lambda f: (not near(f, first), _moved(f)))
-    told = _told(videos, drifted(best), first)
+    told = _told(videos, drifted(best))
     if len(alike) > 1 and not near(best, first):
         choices = [best, *(f for f in alike if f is not best)][:_SHOWN]
         lags = " or ".join(f"({list_lags(f.footage.lags)})" for f in choices)
@@ -325,11 +328,11 @@ def _learned(videos: _Videos, first: Floats) -> Lags:
     return told
 
 
-def _searched(videos: _Videos, first: Floats) -> tuple[bool, list[Adjustment]]:
+def _searched(videos: _Videos) -> tuple[bool, list[Adjustment]]:
     """Whether cameras should be loose, and fits to some of the instants, the best first."""
     found = lag_misses(videos.given, videos.known)
     promising = [dips(*misses)[:_PROMISING] or [0.0] for misses in found]
-    exact = _climbed(videos, promising, first, False)
+    exact = _climbed(videos, promising, False)
     if not exact or score(exact[0]) <= FINE:
         return False, exact
     if score(exact[0]) <= DISAGREEMENT:
@@ -337,15 +340,13 @@ def _searched(videos: _Videos, first: Floats) -> tuple[bool, list[Adjustment]]:
         if other is None or score(other) * BETTER >= score(exact[0]):
             return False, exact
     # Where the rig is wrong, its best lags may be wrong as well: so all are tried again.
-    loose = _climbed(videos, promising, first, True)
+    loose = _climbed(videos, promising, True)
     if loose and score(loose[0]) * BETTER < score(exact[0]):
         return True, loose
     return False, exact
 
 
-def _climbed(
-    videos: _Videos, promising: list[list[float]], first: Floats, loose: bool
-) -> list[Adjustment]:
+def _climbed(videos: _Videos, promising: list[list[float]], loose: bool) -> list[Adjustment]:
     """Fits to some instants from the most promising lags and all that differ from the best in one.
 
     The best are tried in all combinations with the others' until none is better.
@@ -361,7 +362,7 @@ def _climbed(
         return np.inf if found is None else found.left()
 
     best = np.array([lags[0] for lags in promising])
-    fits(first)
+    fits(videos.given.lags)
     while True:
         moved = ((i, lag) for i in range(count) for lag in promising[i])
         winner = min((np.where(np.arange(count) == i, lag, best) for i, lag in moved), key=fits)
@@ -385,11 +386,11 @@ def _different(found: list[Adjustment]) -> list[Adjustment]:
 # --------------------------------------------------------------------- errors, and what is told
 
 
-def _told(videos: _Videos, fit: Adjustment, first: Floats) -> Lags:
+def _told(videos: _Videos, fit: Adjustment) -> Lags:
     """What a fit tells of the lags, or that it tells nothing."""
-    lags, count = fit.footage.lags.copy(), len(first) - 1
+    lags, count = fit.footage.lags.copy(), len(fit.start) - 1
     if not shares(fit).all():
-        return _untold(videos, first, score(fit) <= DISAGREEMENT)
+        return _untold(videos, score(fit) <= DISAGREEMENT)
     together, rate_errors = covariance(fit), np.zeros(len(lags))
     drifting = fit.errors[:, DRIFT] > 0
     rate_errors[drifting] = np.sqrt(np.diag(together)[count:]) / fit.footage.span
@@ -414,13 +415,13 @@ def _told(videos: _Videos, fit: Adjustment, first: Floats) -> Lags:
     )
 
 
-def _untold(videos: _Videos, lags: Floats, agree: bool) -> Lags:
+def _untold(videos: _Videos, agree: bool) -> Lags:
     """Lags of which the tracks tell nothing, as all agree or none; the first one is the clock."""
+    lags, residual = videos.given.lags, np.inf
     errors = np.where(np.arange(len(lags)) > 0, np.inf, 0.0)
-    residual, footage = np.inf, replace(videos.given, lags=lags)
-    cameras = videos.cameras(footage)
+    cameras = videos.cameras(videos.given)
     if cameras is not None:
-        residual = max(map(trimmed, missed(cameras, footage.aligned)))
+        residual = max(map(trimmed, missed(cameras, videos.given.aligned)))
     warnings = [_blurred(i, lags) for i in range(1, len(lags))]
     if not agree:
         left = f"leave {residual:.2g} pixels" if residual < np.inf else "no cameras fit"
@@ -474,9 +475,9 @@ def _fits(footage: Footage, rig: Rig, *lags: Floats) -> list[Adjustment]:
     return [fit for fit in found if fit]
 
 
-def _near(footage: Footage, rig: Rig, start: Floats) -> list[Adjustment]:
-    """Near given lags and the best of two views, which are as rough as the rig."""
-    return _fits(footage, rig, start, _paired(footage, rig.cameras)[1])
+def _near(footage: Footage, rig: Rig) -> list[Adjustment]:
+    """Near its lags and the best of two views, which are as rough as the rig."""
+    return _fits(footage, rig, footage.lags, _paired(footage, rig.cameras)[1])
 
 
 def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | None:
@@ -493,7 +494,7 @@ def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | No
     """
     start, found = given.lags, list[Mistake]()
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
-        begun = _near(given, rig, start)
+        begun = _near(given, rig)
         left = min(map(_worst, begun), default=np.inf)
         if left <= 2 * DISAGREEMENT:
             return None
@@ -584,8 +585,8 @@ def _dropped(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[s
             [x[r] for x, r in zip(each, rows, strict=True)] for each in (given.tracks, given.clocks)
         )
         if min(map(len, tracks)) > 1:
-            part = Footage.of(tracks, None, given.rates, clocks)
-            ways += [_jumped(given, given, fit) for fit in _near(part, rig, given.lags)]
+            part = Footage.of(tracks, given.lags, given.rates, clocks)
+            ways += [_jumped(given, given, fit) for fit in _near(part, rig)]
     for _ in range(3):  # as what is mended tells the cameras, and these the rest
         if not ways:
             return

@@ -10,7 +10,6 @@ augmentations from the seed and its own number.
 import io
 import json
 import os
-import platform
 from typing import Any
 
 import cv2
@@ -23,7 +22,7 @@ from tqdm import trange
 
 from ..arrays import Floats, Floats32, Image
 from ..checks import check_integer, check_path
-from ..storage import write_file
+from ..storage import library_versions, write_file
 from .rendering import BACKGROUNDS, COLOURS, Box, LabelledFrame, Scene, draw_frames
 from .tracking import WEIGHTS
 
@@ -348,10 +347,5 @@ def _training_log(seed: int, losses: list[float], parameters: int) -> dict[str, 
         "parameters": parameters,
         "steps_per_loss": block,
         "loss": [round(float(mean), 4) for mean in means],
-        "versions": {
-            "python": platform.python_version(),
-            "torch": torch.__version__,
-            "numpy": np.__version__,
-            "opencv": cv2.__version__,
-        },
+        "versions": library_versions(),
     }

@@ -155,13 +155,7 @@ class Plate:
         self.valid |= covered
         never = ((count == 0) & (covered > 0)).astype(np.uint8)
         if never.any():
-            left, top, width, height = cv2.boundingRect(never)
-            margin = 8  # pixels that show how its surroundings continue
-            window = np.s_[max(top - margin, 0) : top + height + margin,
-                           max(left - margin, 0) : left + width + margin]  # fmt: skip
-            self.image[window] = cv2.inpaint(
-                self.image[window], never[window], 3, cv2.INPAINT_TELEA
-            )
+            self.image = np.asarray(cv2.inpaint(self.image, never, 3, cv2.INPAINT_TELEA), np.uint8)
 
     def laid(
         self, image: NDArray, here: Floats, low: Ints | None = None, high: Ints | None = None,

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from fractions import Fraction
 from pathlib import Path
@@ -345,10 +345,8 @@ def _encode(
         with av.open(str(partial.absolute()), "w") as container:
             for frame in _checked(frames):
                 stream = stream or _add_stream(container, codec, rate, frame.shape[1::-1])
-                # In the format of the codec, if that costs no more.
-                plain = codec.pixels == "rgb24"
-                colours = (frame, "rgb24") if plain else (_turned(frame), "bgr24")
-                container.mux(stream.encode(av.VideoFrame.from_ndarray(*colours)))
+                given = av.VideoFrame.from_ndarray(_turned(frame), "bgr24")
+                container.mux(stream.encode(given))
                 count += 1
             if stream is None:
                 raise ValueError("frames: at least one frame is needed, got none")
@@ -532,7 +530,6 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
             yield from (image for i, image in enumerate(_images(path)) if i in numbers)
             return
         keys = [time or 0 for time, is_key in packets if is_key]
-        wanted = {times[number] for number in numbers if number < len(times)}
         frames: Iterator[VideoFrame] = iter(())
         now = -np.inf
         for number in numbers:
@@ -542,7 +539,7 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
             key = max((key for key in keys if key <= time), default=min(keys, default=time))
             if key > now:
                 container.seek(key, stream=stream)
-                frames = _decoded(container, stream, wanted)
+                frames = _decoded(container, stream)
             frame = next((f for f in frames if f.pts is not None and f.pts >= time), None)
             if frame is None:
                 return
@@ -576,21 +573,12 @@ def _packets(container: InputContainer, stream: VideoStream) -> list[tuple[int |
     return [(p.pts, p.is_keyframe) for p in packets if p.size and not p.is_discard]
 
 
-def _decoded(
-    container: InputContainer, stream: VideoStream, wanted: Container[int] | None = None
-) -> Iterator[VideoFrame]:
-    """The frames from here on, up to where the file is cut off or damaged.
-
-    If only those shown at some times are `wanted`, others that no frame needs are left out.
-    """
+def _decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFrame]:
+    """The frames from here on, up to where the file is cut off or damaged."""
     import av
 
     with suppress(av.FFmpegError):
-        for packet in container.demux(stream):
-            if wanted is not None:
-                needed = packet.is_keyframe or packet.pts is None or packet.pts in wanted
-                stream.codec_context.skip_frame = "DEFAULT" if needed else "NONREF"
-            yield from packet.decode()
+        yield from container.decode(stream)
 
 
 def _first(path: str | os.PathLike) -> Image:
@@ -613,8 +601,6 @@ def _image(frame: VideoFrame) -> Image:
     """Red, green and blue of a decoded frame, upright."""
     if frame.interlaced_frame:
         image = upper_field(frame)
-    elif frame.format.name == "rgb24":
-        image = cast("Image", frame.to_ndarray().copy())  # the decoder needs its own
     else:  # more threads cost more than they save
         image = _turned(cast("Image", frame.to_ndarray(format="bgr24", threads=1)))
     return np.ascontiguousarray(np.rot90(image, round(frame.rotation / 90)))
