@@ -303,7 +303,7 @@ class Collocation:
     def _pull(self) -> Floats:
         """How the systematic errors pull at the control points, (r d, k)."""
         weighted, _ = self._shared
-        pull = self.grid.back @ weighted.reshape(len(self.grid.x), -1)
+        pull = self.grid.samples.T @ weighted.reshape(len(self.grid.x), -1)
         return np.asarray(pull).reshape(self.grid.r * self.d, -1)
 
     def curve(self, control_points: Floats) -> Floats:
@@ -312,18 +312,14 @@ class Collocation:
 
     def node_states(self, control_points: Floats) -> tuple[Floats, Floats]:
         """The curve and its slope at the collocation nodes, each of shape (k, d)."""
-        _, x, slope = self.grid.along(control_points)
-        return x, slope
+        return self.grid.nodes @ control_points, self.grid.slopes @ control_points
 
     def data_residual(self, control_points: Floats) -> tuple[Floats, Floats]:
         """Curve plus systematic errors minus data, (n, d), and the best sizes of these, (k,).
 
         What was not observed has residual 0.
         """
-        return self._left(self.curve(control_points))
-
-    def _left(self, curve: Floats) -> tuple[Floats, Floats]:
-        """`data_residual` of a curve at the samples, (n, d)."""
+        curve = self.curve(control_points)
         residual = np.where(self.precision > 0, curve - self.grid.x, 0.0)
         if not self.systematic.size:
             return residual, np.zeros(0)
@@ -331,17 +327,14 @@ class Collocation:
         sizes = -np.linalg.solve(information, np.einsum("nik,ni->k", weighted, residual))
         return residual + (self.precision > 0) * (self.systematic @ sizes), sizes
 
-    def data_loss(self, curve: Floats) -> float:
+    def data_loss(self, control_points: Floats) -> float:
         """Weighted sum of squares of the data residual (chi-square), systematic errors included."""
-        residual, sizes = self._left(curve)
+        residual, sizes = self.data_residual(control_points)
         return float((residual**2 * self.sample_weights).sum() + sizes @ sizes)
 
     def physics_residual(self, state: State) -> Floats:
         """``dG P - phi(G P - offset) Lambda`` at the nodes, shape (k, d)."""
-        return self._missed(state, *self.node_states(state.control_points))
-
-    def _missed(self, state: State, x: Floats, slope: Floats) -> Floats:
-        """`physics_residual` of a curve that is at the nodes as given."""
+        x, slope = self.node_states(state.control_points)
         law = state.coefficients + self.known
         rows = law.any(axis=1)
         exponents, law = self.exponents[rows], law[rows]
@@ -353,9 +346,8 @@ class Collocation:
     @np.errstate(over="ignore", invalid="ignore")  # of steps that go too far, and are refused
     def objective(self, state: State) -> float:
         """Data loss plus weighted physics loss, in chi-square units."""
-        curve, x, slope = self.grid.along(state.control_points)
-        squares = self.grid.node_weights @ self._missed(state, x, slope) ** 2
-        return self.data_loss(curve) + float(squares @ self.physics_weights)
+        squares = self.grid.node_weights @ self.physics_residual(state) ** 2
+        return self.data_loss(state.control_points) + float(squares @ self.physics_weights)
 
     def linearise(
         self, state: State, columns: Ints, damping: float = 0.0, part: Bools | None = None
@@ -379,17 +371,16 @@ class Collocation:
         scipy.linalg.LinAlgError
             If the banded normal matrix is not positive definite.
         """
-        curve, x, slope = self.grid.along(state.control_points)
-        physics, unknowns = self._derivatives(state, columns, x, slope)
+        physics, unknowns = self._derivatives(state, columns)
         if part is not None:
             own = unknowns[:, 1 : 1 + len(columns)] * part.repeat(self.d)[:, None]
             unknowns = np.insert(unknowns, [1 + len(columns)], own, axis=1)
             columns = np.append(columns, columns + len(state.sources))
-        data_residual, sizes = self._left(curve)
+        data_residual, sizes = self.data_residual(state.control_points)
         factor = self._factor(physics, damping)
 
         response = physics.T @ unknowns
-        response[:, 0] += (self.grid.back @ (data_residual * self.sample_weights)).ravel()
+        response[:, 0] += (self.grid.samples.T @ (data_residual * self.sample_weights)).ravel()
         response[:, 1 + len(columns) :] = self._pull
         response = -cho_solve_banded((factor, True), response, check_finite=False)
 
@@ -418,19 +409,17 @@ class Collocation:
 
     def factor(self, state: State) -> tuple[Floats, sparse.csr_array]:
         """That factor at a state, and the Jacobian of the weighted physics residual, (k d, r d)."""
-        nodes = self.node_states(state.control_points)
-        physics, _ = self._derivatives(state, np.array([], dtype=int), *nodes)
+        physics, _ = self._derivatives(state, np.array([], dtype=int))
         return self._factor(physics), physics
 
-    def _derivatives(
-        self, state: State, columns: Ints, x: Floats, slope: Floats
-    ) -> tuple[sparse.csr_array, Floats]:
-        """The weighted physics residual around a state, whose curve is at the nodes as given.
+    def _derivatives(self, state: State, columns: Ints) -> tuple[sparse.csr_array, Floats]:
+        """The weighted physics residual around a state.
 
         Its Jacobian in the control points, (k d, r d); and, side by side, (k d, 1 + m + s), the
         residual itself, its derivatives in the columns, and zeros for the systematic errors.
         """
         d, l = self.d, len(self.exponents)
+        x, slope = self.node_states(state.control_points)
         law = state.coefficients + self.known
         z, below = law_variables(x - state.offset, self.functions, self.exponents, law)
         terms = monomials(z, self.exponents)

@@ -186,7 +186,7 @@ class History:
     def add(self, stage: str, problem: Problem, fit: Fit, weight: float) -> None:
         """Add what a fit at a relative physics weight has reached."""
         state, collocation = fit.state, fit.collocation
-        data = collocation.data_loss(collocation.curve(state.control_points))
+        data = collocation.data_loss(state.control_points)
         self.steps.append(
             Step(
                 stage=stage,
