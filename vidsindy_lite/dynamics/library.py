@@ -15,7 +15,7 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline, interp1d
+from scipy.interpolate import BSpline, make_interp_spline
 from scipy.special import comb as binomial
 
 from ..arrays import Bools, Floats, Ints
@@ -263,13 +263,13 @@ class Input:
 
     Parameters
     ----------
-    pieces : tuple of CubicSpline or interp1d
+    pieces : tuple of BSpline
         One a trajectory.
     unsure : ndarray, shape (k, 2)
         Times of samples between which it jumps, nobody knows when.
     """
 
-    pieces: tuple[CubicSpline | interp1d, ...]
+    pieces: tuple[BSpline, ...]
     unsure: Floats
 
     @classmethod
@@ -289,7 +289,7 @@ class Input:
         check_items(f"inputs: {name}", runs, len(times), "trajectory")
         found = [_curve(name, part, run, hold) for part, run in zip(times, runs, strict=True)]
         pieces = [curve for curve, _ in found]
-        ends = sorted((spline.x[0], spline.x[-1]) for spline in pieces)
+        ends = sorted((spline.t[0], spline.t[-1]) for spline in pieces)
         for (_, last), (first, _) in zip(ends[:-1], ends[1:], strict=True):
             if not last < first:
                 raise ValueError(
@@ -299,20 +299,22 @@ class Input:
         return cls(tuple(pieces), np.concatenate([unsure for _, unsure in found]))
 
     def __call__(self, t: Floats) -> Floats:
-        """The values at times (n,); NaN where it was not measured, but for rounding at the ends."""
-        t = np.asarray(t, dtype=float)
-        values = np.full(t.shape, np.nan)
-        for spline in self.pieces:
-            low, high = spline.x[0], spline.x[-1]
-            slack = 1e-6 * (high - low)
-            inside = (t >= low - slack) & (t <= high + slack)
-            values[inside] = spline(np.clip(t[inside], low, high))
-        return values
+        """The values at times (n,); NaN where it was not measured."""
+        return of_pieces(self.pieces, np.asarray(t, dtype=float))
 
 
-def _curve(
-    name: str, t: Floats, values: Floats, hold: str | None
-) -> tuple[CubicSpline | interp1d, Floats]:
+def of_pieces(pieces: Sequence[BSpline], t: Floats) -> Floats:
+    """What curves of times apart are at times (n,); NaN beyond, but for rounding at their ends."""
+    values = np.full((*t.shape, *pieces[0].c.shape[1:]), np.nan)
+    for curve in pieces:
+        low, high = curve.t[0], curve.t[-1]
+        slack = 1e-6 * (high - low)
+        inside = (t >= low - slack) & (t <= high + slack)
+        values[inside] = curve(np.clip(t[inside], low, high))
+    return values
+
+
+def _curve(name: str, t: Floats, values: Floats, hold: str | None) -> tuple[BSpline, Floats]:
     """The curve through samples, which are checked, and between which it jumps at no known time."""
     t, values = check_times(t), check_array("inputs", values)
     if values.shape != t.shape:
@@ -322,12 +324,14 @@ def _curve(
     if not np.isfinite(values).all():
         first = t[np.argmin(np.isfinite(values))]
         raise ValueError(f"inputs: {name} must be finite, got NaN or infinity at t = {first:g}")
-    curve, line, unsure = CubicSpline(t, values), interp1d(t, values), np.zeros((0, 2))
+    degrees, unsure = {"zero": 0, "linear": 1, "cubic": min(3, len(t) - 1)}, np.zeros((0, 2))
+    curves = {kind: make_interp_spline(t, values, degree) for kind, degree in degrees.items()}
     if hold is None:
         middles, steps = (t[1:] + t[:-1]) / 2, np.abs(np.diff(values))
         # Midway a cubic is so far from a line at six samples of a sine a period: more is a guess.
         much = 0.1 * values.std()
-        hold = "zero" if (np.abs(curve(middles) - line(middles)) > much).any() else "cubic"
+        bend = np.abs(curves["cubic"](middles) - curves["linear"](middles))
+        hold = "zero" if (bend > much).any() else "cubic"
         if hold == "zero":
             unsure = np.column_stack([t[:-1], t[1:]])[steps > much]
             warnings.warn(
@@ -338,8 +342,7 @@ def _curve(
                 "hold='zero', or what is true by 'linear' or 'cubic'",
                 stacklevel=2,
             )
-    kinds = {"zero": interp1d(t, values, "previous"), "linear": line, "cubic": curve}
-    return kinds[hold], unsure
+    return curves[hold], unsure
 
 
 def jumps(value: Callable[[Floats], Floats], t: Floats, halvings: int = 30) -> Floats:
