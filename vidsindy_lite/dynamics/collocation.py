@@ -16,6 +16,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy import sparse
+from scipy.interpolate import BSpline
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
 from ..arrays import Bools, Floats, Ints
@@ -124,6 +125,16 @@ class Fit:
     collocation: Collocation
     status: Status
     criterion: float = np.nan
+
+    @property
+    def splines(self) -> list[BSpline]:
+        """The curve, a spline a segment."""
+        return self.collocation.grid.splines(self.state.control_points)
+
+    @property
+    def residual(self) -> Floats:
+        """What it leaves of the data, (n, d); see `Collocation.data_residual`."""
+        return self.collocation.data_residual(self.state.control_points)[0]
 
 
 @dataclass(frozen=True)

@@ -112,8 +112,7 @@ def infer(
         history=tuple(history.steps),
         absent=intervals(problem, fit.state, model, tolerated),
         curves=tuple(
-            BSpline(s.t * units.time, s.c * units.scale + units.centre, DEGREE)
-            for s in collocation.grid.splines(state.control_points)
+            BSpline(s.t * units.time, s.c * units.scale + units.centre, DEGREE) for s in fit.splines
         ),
     )
 

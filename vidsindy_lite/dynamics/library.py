@@ -16,6 +16,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_interp_spline
+from scipy.linalg import block_diag
 from scipy.special import comb as binomial
 
 from ..arrays import Bools, Floats, Ints
@@ -649,9 +650,7 @@ class Library:
         powers = np.empty((0, d), dtype=int)
         if self.degree is not None:
             powers = np.pad(monomial_exponents(states, self.degree), ((0, 0), (0, d - states)))
-        exponents = np.zeros((len(powers) + len(functions), d + len(functions)), dtype=int)
-        exponents[: len(powers), :d] = powers
-        exponents[len(powers) :, d:] = np.eye(len(functions), dtype=int)
+        exponents = block_diag(powers, np.eye(len(functions), dtype=int))
         if self.denominators:
             exponents = np.pad(exponents, ((0, 0), (0, d)))
             below = monomial_exponents(states, self.denominators)[1:]
@@ -663,19 +662,16 @@ class Library:
 
     def _check_size(self, states: int, measured: int, most: int = 1000) -> None:
         """Refuse more terms than a search can try to an end, before they are listed."""
-        counts = [
-            ("monomials", comb(states + degree, states), f"of degree {degree}")
-            for degree in (self.degree or 0, self.denominators)
-        ]
-        waves = 2 * self.harmonics * measured
-        for what, count, which in [
-            *counts, ("sines and cosines", waves, f"of {self.harmonics} multiples")
-        ]:  # fmt: skip
-            if count > most:
-                raise ValueError(
-                    f"library: must have at most {most} {what}, got {count} {which} in {states} "
-                    "variables"
-                )
+        degree, waves = max(self.degree or 0, self.denominators), 2 * self.harmonics * measured
+        count, what, which = max(
+            (comb(states + degree, states), "monomials", f"of degree {degree}"),
+            (waves, "sines and cosines", f"of {self.harmonics} multiples"),
+        )
+        if count > most:
+            raise ValueError(
+                f"library: must have at most {most} {what}, got {count} {which} in {states} "
+                "variables"
+            )
 
 
 def check_library(degree: int | None, library: Library | None) -> Library:

@@ -37,8 +37,7 @@ def _spread(fit: Fit) -> Floats:
     """
     collocation, seen = fit.collocation, fit.collocation.counts > 0
     used = fit.state.free().sum() / seen.sum() + len(collocation.segments)
-    residual, _ = collocation.data_residual(fit.state.control_points)
-    squares = (residual**2 * collocation.precision).sum(axis=0)[seen]
+    squares = (fit.residual**2 * collocation.precision).sum(axis=0)[seen]
     spread = np.sqrt(squares / np.maximum(collocation.counts[seen] - used, 1.0))
     return spread_to_unseen(spread, seen)
 
@@ -68,8 +67,7 @@ def errors_left(problem: Problem, fit: Fit) -> Floats:
 def _errors_seen(fit: Fit) -> list[list[Floats]]:
     """Residuals of each coordinate, of precision 1, where it was seen: a column a stretch."""
     collocation = fit.collocation
-    residual, _ = collocation.data_residual(fit.state.control_points)
-    residual *= np.sqrt(collocation.precision)
+    residual = fit.residual * np.sqrt(collocation.precision)
     residual[np.isnan(collocation.grid.x)] = np.nan
     stretches = collocation.grid.split(residual)
     return [
@@ -85,13 +83,11 @@ def time_inflation(fit: Fit) -> float:
     the path, together: at most the root of their number.
     """
     collocation = fit.collocation
-    residual, _ = collocation.data_residual(fit.state.control_points)
-    splines = collocation.grid.splines(fit.state.control_points)
-    pairs = zip(splines, collocation.segments, strict=True)
+    pairs = zip(fit.splines, collocation.segments, strict=True)
     slopes = np.concatenate([spline(segment.t, 1) for spline, segment in pairs])
     seen = collocation.counts > 0
     scale = (np.sqrt(collocation.precision) / residual_noise(fit))[:, seen]
-    residual, slopes = residual[:, seen] * scale, slopes[:, seen] * scale
+    residual, slopes = fit.residual[:, seen] * scale, slopes[:, seen] * scale
     along = (residual * slopes).sum(axis=1) ** 2 / np.maximum((slopes**2).sum(axis=1), LEAST)
     apart = (residual**2).sum(axis=1) / np.maximum((scale > 0).sum(axis=1), 1)
     ratio = float(along.sum() / np.maximum(apart.sum(), LEAST))
@@ -317,8 +313,7 @@ def _measured_badly(problem: Problem, fit: Fit, segments: list[Segment]) -> Fit:
 
 def _on_knots(collocation: Collocation, fit: Fit) -> State:
     """The state of a fit on other knots."""
-    curves = fit.collocation.grid.splines(fit.state.control_points)
-    return replace(fit.state, control_points=fit_curves(collocation, curves))
+    return replace(fit.state, control_points=fit_curves(collocation, fit.splines))
 
 
 def _balanced(
@@ -346,8 +341,7 @@ def _balanced(
         solved = cho_solve_banded((factor, True), probes)
         in_law = ((physics @ probes) * (physics @ solved)).mean(axis=1).reshape(-1, d).sum(axis=0)
         in_data = _measurements_used(collocation, probes, solved)
-        residual, _ = collocation.data_residual(state.control_points)
-        missed = (collocation.precision * residual**2).sum(axis=0)
+        missed = (collocation.precision * fit.residual**2).sum(axis=0)
         kicked = grid.node_weights @ collocation.physics_residual(state) ** 2
         data = np.maximum(collocation.counts - in_data, 1.0) / np.maximum(missed, LEAST)
         law = np.maximum(unfitted - in_law, 1.0) / np.maximum(kicked, LEAST)

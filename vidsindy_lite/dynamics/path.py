@@ -201,7 +201,7 @@ def _moved(problem: Problem, fit: Fit, origins: Sequence[Origin], history: Histo
     others = [there for there in origins if (there[1] != fit.state.moving).any()]
     if not others:
         return fit
-    start = cheapest(problem, closed(problem, fit, FINAL_WEIGHT), others)
+    start = cheapest(problem, closed(problem, fit), others)
     if not start.criterion < fit.criterion + problem.penalties.max():
         return fit
     start = start.collocation.solve(start.state)  # its curve is still that of the frame before
@@ -378,8 +378,7 @@ def polish(problem: Problem, fit: Fit, history: History, most: int = 4) -> Fit:
         before = fit.state.flat()[columns]
         segments = [segment.refined() for segment in fit.collocation.segments]
         finer = problem.collocation(segments, errors_left(problem, fit))
-        splines = fit.collocation.grid.splines(fit.state.control_points)
-        state = replace(fit.state, control_points=fit_curves(finer, splines))
+        state = replace(fit.state, control_points=fit_curves(finer, fit.splines))
         fit = problem.weighted(problem.along(finer, state), FINAL_WEIGHT).solve(state, EXACT)
         information = fit.collocation.linearise(fit.state, columns).information
         spread = np.sqrt(np.diag(inverse(information)))
@@ -401,8 +400,7 @@ def bridged(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
     whose bridges spoil the fit is halved, down to single gaps.
     """
     law = problem.law(fit.state).shift(fit.state.offset)
-    splines = fit.collocation.grid.splines(fit.state.control_points)
-    joined, curves = join(problem, fit.collocation.segments, splines, law, group)
+    joined, curves = join(problem, fit.collocation.segments, fit.splines, law, group)
     whole = problem.collocation(joined)
     start = replace(fit.state, control_points=fit_curves(whole, curves))
     trial = tightened(problem, whole, start)

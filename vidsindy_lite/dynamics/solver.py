@@ -320,14 +320,12 @@ def accelerated(curves: Sequence[BSpline]) -> bool:
     of 40 %, outside the library up to .002; throws .02. Of the accelerations' squares clean flows
     leave .26 to .64 to no linear law, springs and throws up to .06.
     """
-    places, slopes, bends = [], [], []
-    for curve in curves:
-        low, high = curve.t[DEGREE + 1], curve.t[-DEGREE - 2]  # the outermost spans bend by chance
-        t = np.arange(low, high, 1 / 10)
-        places.append(curve(t))
-        slopes.append(curve(t, 1))
-        bends.append(curve(t, 2))
-    x, v, a = (np.concatenate(parts) for parts in (places, slopes, bends))
+    # The outermost spans bend by chance.
+    times = [np.arange(curve.t[DEGREE + 1], curve.t[-DEGREE - 2], 1 / 10) for curve in curves]
+    x, v, a = (
+        np.concatenate([curve(t, order) for curve, t in zip(curves, times, strict=True)])
+        for order in range(3)
+    )
     linear = np.hstack([np.ones((len(x), 1)), x, v])
     cubic = monomials(x, monomial_exponents(x.shape[1], 3))
     several = unexplained(cubic, v)
