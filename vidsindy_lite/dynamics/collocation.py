@@ -190,12 +190,10 @@ class WithCurve(Linearisation):
     def tolerating(self, share: float) -> Linearisation:
         """The same where larger errors are tolerated: ``share`` times the data and physics loss.
 
-        All is given over ``share``. How large the systematic errors are is known as before.
+        How large the systematic errors are is known as before.
         """
-        if not self.sizes.size:
-            return self
-        gram, _ = _without_systematic(self.gram, self.sizes, share)
-        return Linearisation(self.fall, self.columns, gram[1:, 1:], -gram[1:, 0])
+        gram, _ = _without_systematic(share * self.gram, self.sizes)
+        return Linearisation(share * self.fall, self.columns, gram[1:, 1:], -gram[1:, 0])
 
     def along(self, state: State, step: Floats, fraction: float) -> State:
         """The state after a fraction of a step, with the curve that goes with it."""
@@ -280,10 +278,6 @@ class Collocation:
     def segments(self) -> tuple[Segment, ...]:
         """The stretches of data."""
         return self.grid.segments
-
-    @cached_property
-    def _generators(self) -> Floats:
-        return shift_generators(self.exponents)
 
     @property
     def counts(self) -> Ints:
@@ -437,7 +431,7 @@ class Collocation:
         root = np.sqrt(self.grid.node_weights[:, None] * self.physics_weights)
         residual = root * (slope - terms @ law)
         # (nodes, equation, coordinate): how the law changes with the state.
-        rates = (terms @ (self._generators @ law)).transpose(1, 2, 0)
+        rates = (terms @ (shift_generators(self.exponents) @ law)).transpose(1, 2, 0)
         root = root / below
         jacobian = root[:, :, None] * along_state(rates, x - state.offset, self.functions)
         # Minus the terms in their own equation, and the rates of the law for the offset.
@@ -515,15 +509,15 @@ class Collocation:
         return Fit(state, self, Status.MAX_STEPS)
 
 
-def _without_systematic(gram: Floats, sizes: Floats, share: float = 1.0) -> tuple[Floats, Floats]:
+def _without_systematic(gram: Floats, sizes: Floats) -> tuple[Floats, Floats]:
     """Eliminate the sizes of the systematic errors, which go with the law as the curve does.
 
-    They have mean 0 and variance 1, or, as all else is divided by ``share``, its inverse.
+    They have mean 0 and variance 1.
     """
     size = len(gram) - len(sizes)
     pull = gram[size:, :size].copy()
-    pull[:, 0] += sizes / share
-    shared = -np.linalg.solve(gram[size:, size:] + np.eye(len(sizes)) / share, pull)
+    pull[:, 0] += sizes
+    shared = -np.linalg.solve(gram[size:, size:] + np.eye(len(sizes)), pull)
     left = gram[:size, :size] + pull.T @ shared
-    left[0, 0] += sizes @ sizes / share
+    left[0, 0] += sizes @ sizes
     return left, np.asarray(shared, dtype=float)

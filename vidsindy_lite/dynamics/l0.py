@@ -6,8 +6,7 @@ matrix: all matrices are scaled to a unit diagonal before they are solved or inv
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import itemgetter
 
@@ -70,30 +69,6 @@ def subset_search(
     model = _Quadratic.of(information, gradient, present, penalty)
     best = _search(model, start)
     return best.support, model.solution(best), model.value(best)
-
-
-@np.errstate(over="ignore", invalid="ignore")  # of columns that are all but combinations
-def subset_path(
-    functions: Iterable[tuple[Floats, Floats, float]],
-    present: Floats,
-    penalty: Floats,
-    start: Bools,
-) -> list[Bools]:
-    """The supports that `subset_search` finds of several functions, each from the one before.
-
-    Parameters
-    ----------
-    functions : iterable of (ndarray, ndarray, float)
-        Information, gradient, and what the function is multiplied by; the penalties are not.
-    present, penalty, start
-        See `subset_search`.
-    """
-    supports, known, model = [start], None, None
-    for information, gradient, share in functions:
-        if model is None or information is not known:
-            known, model = information, _Quadratic.of(information, gradient, present, penalty)
-        supports.append(_search(replace(model, share=share), supports[-1]).support)
-    return supports[1:]
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of columns that are all but combinations
@@ -188,10 +163,7 @@ class _Fit:
 
 @dataclass(frozen=True)
 class _Quadratic:
-    """A share of a quadratic function, with penalties, its entries scaled to a unit diagonal.
-
-    It remembers of each support what holds for all shares: nine of ten that a search tries have
-    been tried at the share before.
+    """A quadratic function with penalties, its entries scaled to a unit diagonal.
 
     Everything is reckoned from the present point: with data that are nearly exact the function
     itself has more digits than a computer, its changes do not.
@@ -202,8 +174,6 @@ class _Quadratic:
     gradient: Floats
     present: Floats
     penalty: Floats
-    share: float = 1.0
-    fits: dict[bytes, _Fit] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -214,23 +184,12 @@ class _Quadratic:
         return cls(matrix, scale, gradient * scale, present / scale, penalty)
 
     def value(self, fit: _Fit) -> float:
-        """The share of the function, and what entries cost but for those that must be there."""
+        """The function, and what entries cost but for those that must be there."""
         penalty = self.penalty[fit.inside]
-        return float(penalty[np.isfinite(penalty)].sum()) + self.share * fit.fall
+        return float(penalty[np.isfinite(penalty)].sum()) + fit.fall
 
     def fit(self, support: Bools) -> _Fit:
         """The minimum on a support."""
-        if (key := support.tobytes()) not in self.fits:
-            self.fits[key] = self._fitted(support)
-        return self.fits[key]
-
-    def solution(self, fit: _Fit) -> Floats:
-        """The minimiser, zero outside of the support, in units of its own entries."""
-        solution = np.zeros(len(self.scale))
-        solution[fit.inside] = fit.fitted * self.scale[fit.inside]
-        return solution
-
-    def _fitted(self, support: Bools) -> _Fit:
         inside = np.flatnonzero(support)
         block = self.matrix[inside[:, None], inside]
         inverse = np.asarray(np.linalg.inv(block), dtype=float)
@@ -243,6 +202,12 @@ class _Quadratic:
         left = self.gradient - self.matrix @ step
         fall, fitted = -float(step @ (left + self.gradient)), self.present[inside] + moved
         return _Fit(self.matrix, support, inside, inverse, fitted, left, fall)
+
+    def solution(self, fit: _Fit) -> Floats:
+        """The minimiser, zero outside of the support, in units of its own entries."""
+        solution = np.zeros(len(self.scale))
+        solution[fit.inside] = fit.fitted * self.scale[fit.inside]
+        return solution
 
 
 def _search(model: _Quadratic, start: Bools) -> _Fit:
@@ -276,7 +241,7 @@ def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
     """
     room, left = np.maximum(best.room, COLLINEAR)[:, None], best.left[best.outside, None]
     fitted = best.fitted - best.response * (left / room)
-    lost = model.share * fitted**2 / (best.spread + best.response**2 / room)
+    lost = fitted**2 / (best.spread + best.response**2 / room)
     lets_go = (lost < model.penalty[best.inside]).any(axis=1)
     for entry in best.outside[lets_go & ~np.isposinf(model.penalty[best.outside])].tolist():
         value, support = _forced(model, best.support, entry)
@@ -304,10 +269,10 @@ def _changed(support: Bools, dropped: Ints | int, added: Ints | int) -> Bools:
 
 def _best_change(model: _Quadratic, fit: _Fit) -> Change:
     """The best of all drops, adds and swaps."""
-    inside, outside, share = fit.inside, fit.outside, model.share
+    inside, outside = fit.inside, fit.outside
     lost, penalty = fit.fitted**2 / fit.spread, model.penalty[outside]
-    loss = share * lost - model.penalty[inside]
-    cost = penalty - share * fit.gained
+    loss = lost - model.penalty[inside]
+    cost = penalty - fit.gained
     changes = [(np.inf, NONE, NONE)]
     if len(inside):
         changes.append((loss.min(), inside[[loss.argmin()]], NONE))
@@ -315,7 +280,7 @@ def _best_change(model: _Quadratic, fit: _Fit) -> Change:
         changes.append((cost.min(), NONE, outside[[cost.argmin()]]))
     if len(inside) and len(outside):
         swap = loss + penalty[:, None]
-        swap -= share * fit.gained_after
+        swap -= fit.gained_after
         add, drop = divmod(int(swap.argmin()), len(inside))
         changes.append((swap[add, drop], inside[[drop]], outside[[add]]))
     return min(changes, key=lambda change: change[0])

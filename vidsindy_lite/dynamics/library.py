@@ -8,7 +8,6 @@ import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from itertools import combinations_with_replacement
 from math import comb
 from typing import cast
@@ -202,16 +201,9 @@ def shift_matrix(exponents: Ints, offset: Floats, rows: Ints | slice = slice(Non
     """
     still = np.zeros((*offset.shape[:-1], exponents.shape[1] - offset.shape[-1]))
     moved = -np.concatenate([offset, still], axis=-1)[..., None, None, :]
-    factors, lowered = _binomials(exponents.tobytes(), *exponents.shape)
-    return (factors[rows] * moved ** lowered[rows]).prod(axis=-1)
-
-
-@lru_cache(maxsize=64)
-def _binomials(exponents: bytes, l: int, d: int) -> tuple[Floats, Ints]:
-    powers = np.frombuffer(exponents, dtype=int).reshape(l, d)
-    lowered = powers[None, :, :] - powers[:, None, :]
-    factors = np.where(lowered >= 0, binomial(powers[None, :, :], powers[:, None, :]), 0.0)
-    return factors, np.maximum(lowered, 0)
+    high, low = exponents[None, :, :], exponents[:, None, :]
+    factors = binomial(high, low)  # zero where no power is left
+    return (factors[rows] * moved ** np.maximum(high - low, 0)[rows]).prod(axis=-1)
 
 
 def closure(exponents: Ints) -> Ints:

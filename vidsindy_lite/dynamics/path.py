@@ -30,7 +30,7 @@ from ..arrays import Bools, Floats
 from .bspline import Segment
 from .collocation import Fit, State, Status
 from .frames import Origin, cheapest, closed, free_offsets, with_fewer_axes
-from .l0 import NEGLIGIBLE, STRONG, inverse, minimiser, subset_path, subset_search
+from .l0 import NEGLIGIBLE, STRONG, inverse, minimiser, subset_search
 from .model import PolynomialSystem, runge_kutta_4
 from .noise import (
     CONSISTENT,
@@ -88,14 +88,12 @@ def follow(problem: Problem, fit: Fit) -> Path:
     count = int(np.ceil(np.log10(LARGEST / lowest) / STEP))
     # What has to be tolerated is asked itself: a plateau may begin just below it.
     levels = np.union1d(np.geomspace(lowest, LARGEST, count + 1), min(level, LARGEST))
-    shares = [(own / low) ** 2 for low in levels[:-1].tolist()]
-    tolerating = [model.tolerating(share) for share in shares]
-    functions = [
-        (m.information, m.gradient, share) for m, share in zip(tolerating, shares, strict=True)
-    ]
-    searched = subset_path(functions, present, problem.costs(columns), support)
-    flat = np.zeros((len(searched), problem.form.candidates.size), dtype=bool)
-    flat[:, problem.form.searched] = np.array(searched)[:, : len(problem.form.searched)]
+    flat = np.zeros((len(levels) - 1, problem.form.candidates.size), dtype=bool)
+    for terms, low in zip(flat, levels[:-1].tolist(), strict=True):
+        at = model.tolerating((own / low) ** 2)
+        costs = problem.costs(columns)
+        support, _, _ = subset_search(at.information, at.gradient, present, costs, support)
+        terms[problem.form.searched] = support[: len(problem.form.searched)]
     laws = flat[:, problem.form.shared].reshape(len(flat), problem.d, -1)
     plateaus = (_plateaus(j, levels.tolist(), laws[:, j]) for j in range(problem.d))
     return Path(fit, model, own, level, tuple(plateaus))
