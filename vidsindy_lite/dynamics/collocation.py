@@ -249,21 +249,13 @@ class Collocation:
         exponents: Ints,
         data_weights: Floats,
         physics_weights: Floats,
-        systematic: Floats | None = None,
-        precision: Floats | None = None,
-        known: Floats | None = None,
-        functions: tuple[Function, ...] = (),
     ) -> Collocation:
-        """The problem of these segments, by default without systematic errors or known terms.
-
-        NaN in the data are not observed; all else has a precision of 1 by default.
-        """
+        """The problem without systematic errors or known terms; what is NaN was not observed."""
         grid = Grid.of(segments)
-        shared = np.empty((*grid.x.shape, 0)) if systematic is None else systematic
         data, physics = (np.asarray(w, dtype=float) for w in (data_weights, physics_weights))
-        seen = np.where(np.isnan(grid.x), 0.0, 1.0 if precision is None else precision)
-        given = np.zeros((len(exponents), grid.x.shape[1])) if known is None else known
-        return cls(grid, exponents, data, seen, physics, shared, given, functions)
+        seen, none = np.isfinite(grid.x).astype(float), np.empty((*grid.x.shape, 0))
+        known = np.zeros((len(exponents), grid.x.shape[1]))
+        return cls(grid, exponents, data, seen, physics, none, known)
 
     def weighted(self, data_weights: Floats, physics_weights: Floats) -> Collocation:
         """The same with other weights."""

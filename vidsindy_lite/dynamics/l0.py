@@ -14,10 +14,6 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 
-Change = tuple[float, Ints, Ints]
-"""Change of the function, entries dropped, entries added."""
-NONE = np.array([], dtype=int)
-"""No entries."""
 COLLINEAR = 1e-9
 """Share of a column that is not a combination of others, below which it is taken to be one."""
 NEGLIGIBLE = 1e-6
@@ -74,7 +70,7 @@ def subset_search(
 @np.errstate(over="ignore", invalid="ignore")  # of columns that are all but combinations
 def closest_rival(
     information: Floats, gradient: Floats, present: Floats, penalty: Floats, support: Bools
-) -> Change:
+) -> tuple[float, Ints, Ints]:
     """The other support that costs least, of those next to a support.
 
     Every entry has to leave or to join, in turn, and the others then leave and join as they like:
@@ -96,9 +92,7 @@ def closest_rival(
     """
     model = _Quadratic.of(information, gradient, present, penalty)
     rivals = [_forced(model, support, k) for k in np.flatnonzero(np.isfinite(penalty)).tolist()]
-    if not rivals:
-        return np.inf, NONE, NONE
-    value, rival = min(rivals, key=itemgetter(0))
+    value, rival = min(rivals, key=itemgetter(0), default=(np.inf, support))
     cost = value - model.value(model.fit(support))
     return cost, np.flatnonzero(support & ~rival), np.flatnonzero(rival & ~support)
 
@@ -223,10 +217,10 @@ def _descend(model: _Quadratic, start: Bools) -> _Fit:
     """Take the best of all drops, adds and swaps until none helps."""
     best = model.fit(start)
     while True:
-        change, dropped, added = _best_change(model, best)
+        change, entries = _best_change(model, best)
         if not change < -NEGLIGIBLE:
             return best
-        fit = model.fit(_changed(best.support, dropped, added))
+        fit = model.fit(_changed(best.support, entries))
         # Rounding may promise a fall that does not come: what counts is the value itself.
         if not model.value(fit) < model.value(best) - NEGLIGIBLE:
             return best
@@ -254,36 +248,31 @@ def _forced(model: _Quadratic, support: Bools, entry: int) -> tuple[float, Bools
     """The value and support of a descent with an entry forced out of a support, or into it."""
     inside, penalty = support[entry], model.penalty.copy()
     penalty[entry] = np.inf if inside else -np.inf
-    changed = _changed(support, entry, NONE) if inside else _changed(support, NONE, entry)
     forced = replace(model, penalty=penalty)
-    trial = _descend(forced, changed)
+    trial = _descend(forced, _changed(support, [entry]))
     return forced.value(trial) + (0.0 if inside else model.penalty[entry]), trial.support
 
 
-def _changed(support: Bools, dropped: Ints | int, added: Ints | int) -> Bools:
+def _changed(support: Bools, entries: list[int]) -> Bools:
+    """A support without those of some entries that it has, and with the others."""
     changed = support.copy()
-    changed[dropped] = False
-    changed[added] = True
+    changed[entries] ^= True
     return changed
 
 
-def _best_change(model: _Quadratic, fit: _Fit) -> Change:
-    """The best of all drops, adds and swaps."""
-    inside, outside = fit.inside, fit.outside
-    lost, penalty = fit.fitted**2 / fit.spread, model.penalty[outside]
-    loss = lost - model.penalty[inside]
-    cost = penalty - fit.gained
-    changes = [(np.inf, NONE, NONE)]
-    if len(inside):
-        changes.append((loss.min(), inside[[loss.argmin()]], NONE))
-    if len(outside):
-        changes.append((cost.min(), NONE, outside[[cost.argmin()]]))
-    if len(inside) and len(outside):
-        swap = loss + penalty[:, None]
-        swap -= fit.gained_after
-        add, drop = divmod(int(swap.argmin()), len(inside))
-        changes.append((swap[add, drop], inside[[drop]], outside[[add]]))
-    return min(changes, key=lambda change: change[0])
+def _best_change(model: _Quadratic, fit: _Fit) -> tuple[float, list[int]]:
+    """The best of all drops, adds and swaps: change of the function, and whose places change."""
+    loss = fit.fitted**2 / fit.spread - model.penalty[fit.inside]
+    price = model.penalty[fit.outside]
+    # A row for each that joins, the first for none; a column for each that leaves, the same.
+    changes = np.full((1 + len(price), 1 + len(loss)), np.inf)
+    changes[0, 1:] = loss
+    changes[1:, 0] = price - fit.gained
+    changes[1:, 1:] = loss + price[:, None]
+    changes[1:, 1:] -= fit.gained_after
+    add, drop = divmod(int(np.nanargmin(changes)), 1 + len(loss))
+    entries = [*fit.inside[drop - 1 : drop].tolist(), *fit.outside[add - 1 : add].tolist()]
+    return float(changes[add, drop]), entries
 
 
 def _gain(left: Floats, room: Floats) -> Floats:

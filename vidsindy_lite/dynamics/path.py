@@ -48,6 +48,7 @@ from .problem import (
     fit_curves,
     leaves_something_over,
     tightened,
+    typical,
     unpruned,
 )
 from .result import History, Path, Plateau
@@ -104,11 +105,6 @@ def _plateaus(equation: int, levels: list[float], laws: Bools) -> tuple[Plateau,
     changes = np.flatnonzero((laws[1:] != laws[:-1]).any(axis=1)) + 1
     ends = pairwise([0, *changes.tolist(), len(laws)])
     return tuple(Plateau(equation, levels[low], levels[high], laws[low]) for low, high in ends)
-
-
-def typical(noise: Floats) -> float:
-    """One number for the errors of all coordinates: their geometric mean."""
-    return float(np.exp(np.log(noise).mean()))
 
 
 # ------------------------------------------------------------------------------------ a first law

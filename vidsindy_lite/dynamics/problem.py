@@ -16,7 +16,7 @@ from scipy.interpolate import BSpline, make_lsq_spline
 from scipy.special import chdtri
 
 from ..arrays import Bools, Floats, Ints
-from .bspline import DEGREE, PENALTIES, Segment, smooth
+from .bspline import DEGREE, PENALTIES, Grid, Segment, smooth
 from .collocation import CLEANEST, Collocation, Fit, State, Status, WithCurve
 from .data import Trajectory, Units, cut, typical_step, typical_steps
 from .l0 import LEAST
@@ -218,9 +218,9 @@ class Problem:
         precision, smoothed = (self._at(segments, x) for x in (self.precision, self.smoothed))
         shared = self._shared_at(segments, smoothed)
         weights = (self.noise if noise is None else noise) ** -2
-        return Collocation.of(
-            segments, self.exponents, weights, np.ones(self.d), shared, precision, self.known,
-            self.functions,
+        return Collocation(
+            Grid.of(segments), self.exponents, weights, precision, np.ones(self.d), shared,
+            self.known, self.functions,
         )  # fmt: skip
 
     def along(self, collocation: Collocation, state: State) -> Collocation:
@@ -294,9 +294,14 @@ def term_penalties(
     return chdtri(1, false_alarm / rivals)
 
 
+def typical(noise: Floats) -> float:
+    """One number for the errors of all coordinates: their geometric mean."""
+    return float(np.exp(np.log(noise).mean()))
+
+
 def spread_to_unseen(noise: Floats, seen: Bools) -> Floats:
     """The errors of the coordinates that were observed, their geometric mean for the others."""
-    filled = np.full(len(seen), np.exp(np.log(np.maximum(noise, CLEANEST)).mean()))
+    filled = np.full(len(seen), typical(np.maximum(noise, CLEANEST)))
     filled[seen] = noise
     return filled
 
