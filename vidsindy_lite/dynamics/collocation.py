@@ -22,7 +22,7 @@ from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 from ..arrays import Bools, Floats, Ints
 from .bspline import WIDTH, Grid, Segment, normal_band
 from .l0 import RIDGE, equilibrated
-from .library import Function, along_state, law_variables, monomials, shift_generators
+from .library import Function, law_variables, linearised, monomials
 
 CLEANEST = 1e-5
 """Least noise, relative to the spread of the data, that the splines are trusted to resolve."""
@@ -418,14 +418,10 @@ class Collocation:
         d, l = self.d, len(self.exponents)
         x, slope = self.node_states(state.control_points)
         law = state.coefficients + self.known
-        z, below = law_variables(x - state.offset, self.functions, self.exponents, law)
-        terms = monomials(z, self.exponents)
+        terms, below, jacobian = linearised(x - state.offset, self.functions, self.exponents, law)
         root = np.sqrt(self.grid.node_weights[:, None] * self.physics_weights)
-        residual = root * (slope - terms @ law)
-        # (nodes, equation, coordinate): how the law changes with the state.
-        rates = (terms @ (shift_generators(self.exponents) @ law)).transpose(1, 2, 0)
+        residual, jacobian = root * (slope - terms @ law), root[:, :, None] * jacobian
         root = root / below
-        jacobian = root[:, :, None] * along_state(rates, x - state.offset, self.functions)
         # Minus the terms in their own equation, and the rates of the law for the offset.
         offset_columns = columns[columns >= d * l] - d * l
         term_columns = columns[columns < d * l]

@@ -130,20 +130,6 @@ def law_variables(
     return z, below
 
 
-def along_state(rates: Floats, x: Floats, functions: Sequence[Function]) -> Floats:
-    """Derivatives in coordinates and functions, (n, m, >= d + k), as those in coordinates alone.
-
-    The chain rule: (n, m, d).
-    """
-    d = x.shape[1]
-    total = rates[:, :, :d]
-    for k, function in enumerate(functions):
-        rate = rates[:, :, d + k, None]
-        if rate.any():  # those that are in no term may be infinite
-            total = total + rate * function.gradient(x)[:, None, :]
-    return total
-
-
 def monomial_exponents(d: int, degree: int) -> Ints:
     """Exponents of all monomials of ``d`` variables up to ``degree``, in graded order.
 
@@ -244,6 +230,30 @@ def shift_generators(exponents: Ints) -> Floats:
             for i, axis in enumerate(np.eye(d, dtype=int))
         ]
     )
+
+
+def linearised(
+    x: Floats, functions: Sequence[Function], exponents: Ints, law: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """A law, (l, d), around points (n, d), of a library with all divisors of its monomials.
+
+    Returns
+    -------
+    terms : ndarray, shape (n, l)
+    denominators : ndarray, shape (n, d), or (1, d) if all are 1
+    jacobian : ndarray, shape (n, d, d)
+        Derivatives of each equation in each coordinate.
+    """
+    d = x.shape[1]
+    z, below = law_variables(x, functions, exponents, law)
+    terms = monomials(z, exponents)
+    rates = (terms @ (shift_generators(exponents) @ law)).transpose(1, 2, 0)
+    total = rates[:, :, :d]
+    for k, function in enumerate(functions):  # by the chain rule
+        rate = rates[:, :, d + k, None]
+        if rate.any():  # those that are in no term may be infinite
+            total = total + rate * function.gradient(x)[:, None, :]
+    return terms, below, total / below[:, :, None]
 
 
 # --------------------------------------------------------------------------------------------------

@@ -31,15 +31,14 @@ from .library import (
     OTHERS,
     Function,
     Library,
-    along_state,
     check_mapping,
     closure,
     extended,
     law_variables,
+    linearised,
     monomials,
     name_latex,
     places_of,
-    shift_generators,
     shift_matrix,
     velocity_names,
 )
@@ -453,9 +452,7 @@ class PolynomialSystem:
         """
         x = check_array("x", x)
         points, (exponents, law) = self._points(np.atleast_2d(x)), self._own._closed
-        z, below = law_variables(points, self.functions, exponents, law)
-        rates = (monomials(z, exponents) @ (shift_generators(exponents) @ law)).transpose(1, 2, 0)
-        jacobian = along_state(rates, points, self.functions) / below[:, :, None]
+        _, _, jacobian = linearised(points, self.functions, exponents, law)
         return jacobian.reshape(*x.shape, self.d)
 
     def shift(self, offset: Sequence[float] | Floats) -> PolynomialSystem:

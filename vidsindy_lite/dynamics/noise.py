@@ -165,14 +165,14 @@ def smoother_weights(problem: Problem) -> Problem:
     """
     if problem.measured_errors:
         return problem
-    steps, path, left_over = 1e-3, [], []
-    for (_, (t, x)), curve in zip(problem.stretches, problem.curves, strict=True):
-        path.append(np.stack([curve(t), (curve(t + steps) - curve(t - steps)) / (2 * steps)]))
-        left_over.append(path[-1][0] - x)
-    residual = np.nan_to_num(np.concatenate(left_over))
-    observed = np.isfinite(np.concatenate([x for _, (_, x) in problem.stretches]))
-    signal, speed = np.concatenate(path, axis=1)
-    causes = [(signal - problem.origin) ** 2, speed**2]  # what the variance of the noise may follow
+    step, curves = 1e-3, list(zip(problem.curves, problem.stretches, strict=True))
+    behind, signal, ahead = (
+        np.concatenate([curve(t + by) for curve, (_, (t, _)) in curves]) for by in (-step, 0, step)
+    )
+    x = np.concatenate([values for _, (_, values) in problem.stretches])
+    residual, observed = np.nan_to_num(signal - x), np.isfinite(x)
+    # What the variance of the noise may follow: place and speed.
+    causes = [(signal - problem.origin) ** 2, ((ahead - behind) / (2 * step)) ** 2]
     spread = np.sqrt((residual**2).sum(axis=0) / np.maximum(observed.sum(axis=0), 1))
     factors, noise = np.ones_like(residual), problem.noise.copy()
     for j in np.flatnonzero(spread > 1e-4):  # below are the errors of splines
