@@ -22,7 +22,7 @@ from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 from ..arrays import Bools, Floats, Ints
 from .bspline import WIDTH, Grid, Segment, normal_band
 from .l0 import RIDGE, equilibrated
-from .library import Function, law_variables, linearised, monomials
+from .library import Function, law_terms, linearised
 
 CLEANEST = 1e-5
 """Least noise, relative to the spread of the data, that the splines are trusted to resolve."""
@@ -335,10 +335,10 @@ class Collocation:
         law = state.coefficients + self.known
         rows = law.any(axis=1)
         exponents, law = self.exponents[rows], law[rows]
-        z, below = law_variables(x - state.offset, self.functions, exponents, law)
+        terms, below = law_terms(x - state.offset, self.functions, exponents, law)
         if not (below > 0).all():  # a pole on the path would leave the curve free to jump there
             return np.full_like(slope, np.inf)
-        return slope - monomials(z, exponents) @ law
+        return slope - terms @ law
 
     @np.errstate(over="ignore", invalid="ignore")  # of steps that go too far, and are refused
     def objective(self, state: State) -> float:

@@ -106,28 +106,28 @@ def extended(x: Floats, functions: Sequence[Function]) -> Floats:
     return np.column_stack([x, *(f.value(x) for f in functions)]) if functions else x
 
 
-def law_variables(
+def law_terms(
     x: Floats, functions: Sequence[Function], exponents: Ints, law: Floats
 ) -> tuple[Floats, Floats]:
-    """All that the monomials of a law, (l, d), are made of at points (n, d), and its denominators.
+    """The monomials of a law, (l, d), at points (n, d), and its denominators.
 
     Where exponents leave room for slopes, terms with a slope, ``b psi(x) x'``, are those that a
     denominator ``1 - b psi`` brings over: the slopes are what the law makes them.
 
     Returns
     -------
-    variables : ndarray, shape (n, d + k) or (n, 2 d + k)
+    terms : ndarray, shape (n, l)
     denominators : ndarray, shape (n, d), or (1, d) if all are 1
     """
     d, z = x.shape[1], extended(x, functions)
     if exponents.shape[1] == z.shape[1]:
-        return z, np.ones((1, d))
+        return monomials(z, exponents), np.ones((1, d))
     z = np.column_stack([z, np.ones_like(x)])
     implicit, terms = exponents[:, -d:].any(axis=1), monomials(z, exponents)
     below = 1 - terms[:, implicit] @ law[implicit]
     with np.errstate(divide="ignore", invalid="ignore"):  # at a pole
         z[:, -d:] = (terms[:, ~implicit] @ law[~implicit]) / below
-    return z, below
+    return monomials(z, exponents), below
 
 
 def monomial_exponents(d: int, degree: int) -> Ints:
@@ -245,8 +245,7 @@ def linearised(
         Derivatives of each equation in each coordinate.
     """
     d = x.shape[1]
-    z, below = law_variables(x, functions, exponents, law)
-    terms = monomials(z, exponents)
+    terms, below = law_terms(x, functions, exponents, law)
     rates = (terms @ (shift_generators(exponents) @ law)).transpose(1, 2, 0)
     total = rates[:, :, :d]
     for k, function in enumerate(functions):  # by the chain rule

@@ -20,7 +20,7 @@ from .bspline import DEGREE, PENALTIES, Grid, Segment, smooth
 from .collocation import CLEANEST, Collocation, Fit, State, Status, WithCurve
 from .data import Trajectory, Units, cut, typical_step, typical_steps
 from .l0 import LEAST
-from .library import Function, extended, jumps, law_variables, monomials
+from .library import Function, extended, jumps, law_terms, monomials
 from .model import Form, PolynomialSystem
 
 FALSE_ALARM = 0.02
@@ -114,8 +114,7 @@ class Problem:
 
     def terms(self, x: Floats) -> Floats:
         """All candidate terms at standard points, (n, l); those with a slope are 0."""
-        z, _ = law_variables(x, self.functions, self.exponents, np.zeros(self.known.shape))
-        return monomials(z, self.exponents)
+        return law_terms(x, self.functions, self.exponents, np.zeros(self.known.shape))[0]
 
     @property
     def known(self) -> Floats:
