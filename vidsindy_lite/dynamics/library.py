@@ -205,16 +205,14 @@ def places_of(wanted: Ints, exponents: Ints) -> Ints:
     return np.array([row[tuple(powers)] for powers in wanted.tolist()], dtype=int)
 
 
-def divides(exponents: Ints, axes: Bools | None = None) -> Bools:
+def divides(exponents: Ints, axes: Bools) -> Bools:
     """Which monomial (row) divides which (column), itself included; shape (l, l).
 
-    If axes are given, bool (d,), along these only: along the others both have the same power.
+    Along the given axes, bool (d,): along the others both have the same power.
     """
-    if axes is not None:
-        axes = np.append(axes, np.zeros(exponents.shape[1] - len(axes), dtype=bool))
+    along = np.append(axes, np.zeros(exponents.shape[1] - len(axes), dtype=bool))
     row, column = exponents[:, None, :], exponents[None, :, :]
-    lower = row < column if axes is None else axes & (row < column)
-    return np.all((row == column) | lower, axis=-1)
+    return np.all((row == column) | along & (row < column), axis=-1)
 
 
 def shift_generators(exponents: Ints) -> Floats:

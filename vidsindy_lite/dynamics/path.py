@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -492,15 +493,10 @@ def join(
         else:
             joined.append(segment)
             curves.append([spline])
-    return joined, [_end_to_end(pieces) for pieces in curves]
+    return joined, [partial(_end_to_end, pieces) for pieces in curves]
 
 
-def _end_to_end(pieces: Sequence[BSpline]) -> Callable[[Floats], Floats]:
-    """Curves one after the other as a function of increasing times, (n,)."""
-    ends = [piece.t[-1] for piece in pieces[:-1]]
-
-    def states(t: Floats) -> Floats:
-        parts = np.split(t, np.searchsorted(t, ends, side="right"))
-        return np.concatenate([piece(part) for piece, part in zip(pieces, parts, strict=True)])
-
-    return states
+def _end_to_end(pieces: Sequence[BSpline], t: Floats) -> Floats:
+    """Curves one after the other at increasing times, (n,)."""
+    parts = np.split(t, np.searchsorted(t, [piece.t[-1] for piece in pieces[:-1]], side="right"))
+    return np.concatenate([piece(part) for piece, part in zip(pieces, parts, strict=True)])

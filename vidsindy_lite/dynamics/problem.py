@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.interpolate import BSpline, make_lsq_spline
@@ -421,15 +421,12 @@ def with_unseen(
     centre[measured], scale[measured] = units.centre, units.scale
     scale[-1] = units.time if timed else scale[-1]
 
-    def standard(curve: BSpline) -> Callable[[Floats], Floats]:
-        def states(t: Floats) -> Floats:
-            x = (whole(curve, t) - centre) / scale
-            x[:, measured] = curve(t)
-            return x
+    def standard(curve: BSpline, t: Floats) -> Floats:
+        x = (whole(curve, t) - centre) / scale
+        x[:, measured] = curve(t)
+        return x
 
-        return states
-
-    return [standard(curve) for curve in curves], Units(centre, scale, units.time)
+    return [partial(standard, curve) for curve in curves], Units(centre, scale, units.time)
 
 
 def _telling(form: Form, seen: Bools, u: int) -> tuple[int, int]:
