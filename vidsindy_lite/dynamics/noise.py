@@ -266,7 +266,7 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     every = replace(_on_knots(start, fit), active=problem.form.candidates)
     # What is known of a law (the slope of a position is the velocity) holds exactly.
     physics = np.where(free, 1.0, FINAL_WEIGHT) * start.physics_weights
-    kicked = _balanced(problem, start.weighted(start.data_weights, physics), every, rng)
+    kicked = _balanced(problem, replace(start, physics_weights=physics), every, rng)
     if like_kicks(kicked, free, rng) < 0.01:
         return None
     exact = _measured_badly(problem, fit, segments)
@@ -307,7 +307,7 @@ def _measured_badly(problem: Problem, fit: Fit, segments: list[Segment]) -> Fit:
     """The exact law on other knots, at the errors that it leaves."""
     grid = problem.collocation(segments, residual_noise(fit))
     exact = problem.weighted(grid, FINAL_WEIGHT).solve(_on_knots(grid, fit))
-    own = exact.collocation.weighted(residual_noise(exact) ** -2, exact.collocation.physics_weights)
+    own = replace(exact.collocation, data_weights=residual_noise(exact) ** -2)
     return own.solve(exact.state)
 
 
@@ -350,7 +350,7 @@ def _balanced(
         law = np.where(free, law, collocation.physics_weights)
         data, law = np.minimum(data, CLEANEST**-2), np.minimum(law, hardest)
         change = np.log([data / collocation.data_weights, law / collocation.physics_weights])
-        collocation = collocation.weighted(data, law)
+        collocation = replace(collocation, data_weights=data, physics_weights=law)
         if (np.abs(change) < 0.1).all():
             break
     return collocation.solve(state, tolerance=1.0)

@@ -280,8 +280,7 @@ def deepest(
         if near(problem, path.fit) or history.over:
             break
         tolerant = replace(problem, noise=np.maximum(problem.noise, errors / descent))
-        collocation = path.fit.collocation
-        weighted = collocation.weighted(tolerant.noise**-2, collocation.physics_weights)
+        weighted = replace(path.fit.collocation, data_weights=tolerant.noise**-2)
         start = replace(path.fit, collocation=weighted)
         fit = select(tolerant, start, FINAL_WEIGHT, "a smaller error", history)
         fit = at_own_errors(problem, framed(tolerant, fit, history))
@@ -308,8 +307,7 @@ def at_own_errors(problem: Problem, fit: Fit) -> Fit:
     fit = replace(fit, collocation=problem.along(fit.collocation, fit.state))
     collocation = problem.weighted(fit.collocation, FINAL_WEIGHT)
     for _ in range(2):
-        weights = errors_left(problem, fit) ** -2
-        weighted = collocation.weighted(weights, collocation.physics_weights)
+        weighted = replace(collocation, data_weights=errors_left(problem, fit) ** -2)
         fit = weighted.solve(fit.state, tolerance=0.1, max_steps=10)
         if fit.status is not Status.CONVERGED:  # it creeps where the law is held too firmly
             fit = tightened(problem, weighted, fit.state)
@@ -343,7 +341,7 @@ def _refitted(tolerant: Problem, path: Path, goal: Sequence[Plateau], history: H
     """The law of these plateaus, fitted and framed where they begin."""
     fit = path.fit
     active = fit.state.whole(np.stack([plateau.terms for plateau in goal], axis=1))
-    collocation = fit.collocation.weighted(tolerant.noise**-2, fit.collocation.physics_weights)
+    collocation = replace(fit.collocation, data_weights=tolerant.noise**-2)
     trial = tightened(tolerant, collocation, _restricted(path, active))
     trial = replace(trial, criterion=tolerant.criterion(trial.collocation, trial.state))
     if not np.isfinite(trial.criterion):

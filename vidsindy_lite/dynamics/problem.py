@@ -243,7 +243,7 @@ class Problem:
     def weighted(self, collocation: Collocation, weight: float) -> Collocation:
         """The same with another physics weight, relative to the slack, as far as kicks allow."""
         physics = 1.0 / np.maximum(self.slack**2 / weight, self.process_noise**2)
-        return collocation.weighted(collocation.data_weights, physics)
+        return replace(collocation, physics_weights=physics)
 
     @property
     def has_process_noise(self) -> bool:
