@@ -159,8 +159,6 @@ class Linearisation:
 
     def newton(self, damping: float = 0.0) -> tuple[Floats, float]:
         """The best step in the columns, and by how much it promises to lower the objective."""
-        if not len(self.columns):
-            return self.gradient, self.fall
         matrix, scale = equilibrated(self.information, RIDGE + damping)
         step = scale * np.linalg.solve(matrix, scale * self.gradient)
         return step, float(self.fall + self.gradient @ step)
@@ -318,8 +316,6 @@ class Collocation:
         """
         curve = self.curve(control_points)
         residual = np.where(self.precision > 0, curve - self.grid.x, 0.0)
-        if not self.systematic.size:
-            return residual, np.zeros(0)
         weighted, information = self._shared
         sizes = -np.linalg.solve(information, np.einsum("nik,ni->k", weighted, residual))
         return residual + (self.precision > 0) * (self.systematic @ sizes), sizes

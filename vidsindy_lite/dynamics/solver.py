@@ -148,11 +148,8 @@ def discover(
     times = [np.asarray(pair[0]) for pair in (t if x is None else [(t, x)])]
     shared = check_systematic(systematic, times, trajectories)
     measured = trajectories, shared, check_sigma(sigma, times, trajectories)
-    end = (
-        np.inf
-        if time_limit is None
-        else time.perf_counter() + check_positive("time_limit", time_limit)
-    )
+    limit = np.inf if time_limit is None else check_positive("time_limit", time_limit)
+    end = time.perf_counter() + limit
     task = _Task(measured, names, library, origin, seed, progress, end)
     # Matrices this small gain nothing by threads, which wait for each other on a busy machine.
     with one_blas_thread():
