@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -233,32 +232,6 @@ class Grid:
         """Number of control points."""
         return int(self.starts[-1])
 
-    @cached_property
-    def _points(self) -> sparse.csr_array:
-        """`samples`, `nodes` and `slopes`, one below the other."""
-        return sparse.vstack([self.samples, self.nodes, self.slopes], format="csr")
-
-    @cached_property
-    def back(self) -> sparse.csc_array:
-        """`samples`, transposed."""
-        return self.samples.T
-
-    @cached_property
-    def _columns(self) -> tuple[Ints, Ints]:
-        """Columns and row ends of `physics`."""
-        d = self.x.shape[1]
-        first = self.nodes.indices.reshape(-1, WIDTH)[:, :1].repeat(d, axis=0) * d
-        places = (first + np.arange(WIDTH * d)).astype(np.int32)
-        return places.ravel(), np.arange(0, places.size + 1, WIDTH * d, dtype=np.int32)
-
-    def along(self, control_points: Floats) -> tuple[Floats, Floats, Floats]:
-        """The curve at the samples, (n, d), and at the nodes with its slope there, (k, d) each.
-
-        In one product: three would take most of their time to begin.
-        """
-        (n, _), (k, _), every = self.samples.shape, self.nodes.shape, self._points @ control_points
-        return every[:n], every[n : n + k], every[n + k :]
-
     def physics(self, weights: Floats, jacobian: Floats) -> sparse.csr_array:
         """Jacobian of a weighted physics residual in the control points, (k d, r d).
 
@@ -270,8 +243,8 @@ class Grid:
         local = -jacobian[:, :, None, :] * values[:, None, :, None]
         for i in range(d):
             local[:, i, :, i] += weights[:, i, None] * slopes
-        shape = len(values) * d, self.r * d
-        return sparse.csr_array((local.ravel(), *self._columns), shape=shape)
+        first = d * self.nodes.indices[::WIDTH].repeat(d)
+        return rows_from(first, local.reshape(len(first), -1), self.r * d)
 
     def splines(self, control_points: Floats) -> list[BSpline]:
         """The spline of every segment, from the control points of all, (r, d)."""

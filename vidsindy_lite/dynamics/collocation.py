@@ -16,12 +16,13 @@ from functools import cached_property
 
 import numpy as np
 from scipy import sparse
+from scipy.interpolate import BSpline
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
 from ..arrays import Bools, Floats, Ints
 from .bspline import WIDTH, Grid, Segment, normal_band
 from .l0 import RIDGE, equilibrated
-from .library import Function, along_state, law_variables, monomials, shift_generators
+from .library import Function, law_terms, linearised
 
 CLEANEST = 1e-5
 """Least noise, relative to the spread of the data, that the splines are trusted to resolve."""
@@ -125,6 +126,16 @@ class Fit:
     status: Status
     criterion: float = np.nan
 
+    @property
+    def splines(self) -> list[BSpline]:
+        """The curve, a spline a segment."""
+        return self.collocation.grid.splines(self.state.control_points)
+
+    @property
+    def residual(self) -> Floats:
+        """What it leaves of the data, (n, d); see `Collocation.data_residual`."""
+        return self.collocation.data_residual(self.state.control_points)[0]
+
 
 @dataclass(frozen=True)
 class Linearisation:
@@ -148,8 +159,6 @@ class Linearisation:
 
     def newton(self, damping: float = 0.0) -> tuple[Floats, float]:
         """The best step in the columns, and by how much it promises to lower the objective."""
-        if not len(self.columns):
-            return self.gradient, self.fall
         matrix, scale = equilibrated(self.information, RIDGE + damping)
         step = scale * np.linalg.solve(matrix, scale * self.gradient)
         return step, float(self.fall + self.gradient @ step)
@@ -179,12 +188,10 @@ class WithCurve(Linearisation):
     def tolerating(self, share: float) -> Linearisation:
         """The same where larger errors are tolerated: ``share`` times the data and physics loss.
 
-        All is given over ``share``. How large the systematic errors are is known as before.
+        How large the systematic errors are is known as before.
         """
-        if not self.sizes.size:
-            return self
-        gram, _ = _without_systematic(self.gram, self.sizes, share)
-        return Linearisation(self.fall, self.columns, gram[1:, 1:], -gram[1:, 0])
+        gram, _ = _without_systematic(share * self.gram, self.sizes)
+        return Linearisation(share * self.fall, self.columns, gram[1:, 1:], -gram[1:, 0])
 
     def along(self, state: State, step: Floats, fraction: float) -> State:
         """The state after a fraction of a step, with the curve that goes with it."""
@@ -240,24 +247,16 @@ class Collocation:
         exponents: Ints,
         data_weights: Floats,
         physics_weights: Floats,
-        systematic: Floats | None = None,
-        precision: Floats | None = None,
-        known: Floats | None = None,
-        functions: tuple[Function, ...] = (),
     ) -> Collocation:
-        """The problem of these segments, by default without systematic errors or known terms.
-
-        NaN in the data are not observed; all else has a precision of 1 by default.
-        """
+        """The problem without systematic errors or known terms; what is NaN was not observed."""
         grid = Grid.of(segments)
-        shared = np.empty((*grid.x.shape, 0)) if systematic is None else systematic
         data, physics = (np.asarray(w, dtype=float) for w in (data_weights, physics_weights))
-        seen = np.where(np.isnan(grid.x), 0.0, 1.0 if precision is None else precision)
-        given = np.zeros((len(exponents), grid.x.shape[1])) if known is None else known
-        return cls(grid, exponents, data, seen, physics, shared, given, functions)
+        seen, none = np.isfinite(grid.x).astype(float), np.empty((*grid.x.shape, 0))
+        known = np.zeros((len(exponents), grid.x.shape[1]))
+        return cls(grid, exponents, data, seen, physics, none, known)
 
     def weighted(self, data_weights: Floats, physics_weights: Floats) -> Collocation:
-        """The same with other weights."""
+        """The same with other weights of the data and of the law."""
         return replace(self, data_weights=data_weights, physics_weights=physics_weights)
 
     @property
@@ -269,10 +268,6 @@ class Collocation:
     def segments(self) -> tuple[Segment, ...]:
         """The stretches of data."""
         return self.grid.segments
-
-    @cached_property
-    def _generators(self) -> Floats:
-        return shift_generators(self.exponents)
 
     @property
     def counts(self) -> Ints:
@@ -303,7 +298,7 @@ class Collocation:
     def _pull(self) -> Floats:
         """How the systematic errors pull at the control points, (r d, k)."""
         weighted, _ = self._shared
-        pull = self.grid.back @ weighted.reshape(len(self.grid.x), -1)
+        pull = self.grid.samples.T @ weighted.reshape(len(self.grid.x), -1)
         return np.asarray(pull).reshape(self.grid.r * self.d, -1)
 
     def curve(self, control_points: Floats) -> Floats:
@@ -312,50 +307,40 @@ class Collocation:
 
     def node_states(self, control_points: Floats) -> tuple[Floats, Floats]:
         """The curve and its slope at the collocation nodes, each of shape (k, d)."""
-        _, x, slope = self.grid.along(control_points)
-        return x, slope
+        return self.grid.nodes @ control_points, self.grid.slopes @ control_points
 
     def data_residual(self, control_points: Floats) -> tuple[Floats, Floats]:
         """Curve plus systematic errors minus data, (n, d), and the best sizes of these, (k,).
 
         What was not observed has residual 0.
         """
-        return self._left(self.curve(control_points))
-
-    def _left(self, curve: Floats) -> tuple[Floats, Floats]:
-        """`data_residual` of a curve at the samples, (n, d)."""
+        curve = self.curve(control_points)
         residual = np.where(self.precision > 0, curve - self.grid.x, 0.0)
-        if not self.systematic.size:
-            return residual, np.zeros(0)
         weighted, information = self._shared
         sizes = -np.linalg.solve(information, np.einsum("nik,ni->k", weighted, residual))
         return residual + (self.precision > 0) * (self.systematic @ sizes), sizes
 
-    def data_loss(self, curve: Floats) -> float:
+    def data_loss(self, control_points: Floats) -> float:
         """Weighted sum of squares of the data residual (chi-square), systematic errors included."""
-        residual, sizes = self._left(curve)
+        residual, sizes = self.data_residual(control_points)
         return float((residual**2 * self.sample_weights).sum() + sizes @ sizes)
 
     def physics_residual(self, state: State) -> Floats:
         """``dG P - phi(G P - offset) Lambda`` at the nodes, shape (k, d)."""
-        return self._missed(state, *self.node_states(state.control_points))
-
-    def _missed(self, state: State, x: Floats, slope: Floats) -> Floats:
-        """`physics_residual` of a curve that is at the nodes as given."""
+        x, slope = self.node_states(state.control_points)
         law = state.coefficients + self.known
         rows = law.any(axis=1)
         exponents, law = self.exponents[rows], law[rows]
-        z, below = law_variables(x - state.offset, self.functions, exponents, law)
+        terms, below = law_terms(x - state.offset, self.functions, exponents, law)
         if not (below > 0).all():  # a pole on the path would leave the curve free to jump there
             return np.full_like(slope, np.inf)
-        return slope - monomials(z, exponents) @ law
+        return slope - terms @ law
 
     @np.errstate(over="ignore", invalid="ignore")  # of steps that go too far, and are refused
     def objective(self, state: State) -> float:
         """Data loss plus weighted physics loss, in chi-square units."""
-        curve, x, slope = self.grid.along(state.control_points)
-        squares = self.grid.node_weights @ self._missed(state, x, slope) ** 2
-        return self.data_loss(curve) + float(squares @ self.physics_weights)
+        squares = self.grid.node_weights @ self.physics_residual(state) ** 2
+        return self.data_loss(state.control_points) + float(squares @ self.physics_weights)
 
     def linearise(
         self, state: State, columns: Ints, damping: float = 0.0, part: Bools | None = None
@@ -379,17 +364,16 @@ class Collocation:
         scipy.linalg.LinAlgError
             If the banded normal matrix is not positive definite.
         """
-        curve, x, slope = self.grid.along(state.control_points)
-        physics, unknowns = self._derivatives(state, columns, x, slope)
+        physics, unknowns = self._derivatives(state, columns)
         if part is not None:
             own = unknowns[:, 1 : 1 + len(columns)] * part.repeat(self.d)[:, None]
             unknowns = np.insert(unknowns, [1 + len(columns)], own, axis=1)
             columns = np.append(columns, columns + len(state.sources))
-        data_residual, sizes = self._left(curve)
+        data_residual, sizes = self.data_residual(state.control_points)
         factor = self._factor(physics, damping)
 
         response = physics.T @ unknowns
-        response[:, 0] += (self.grid.back @ (data_residual * self.sample_weights)).ravel()
+        response[:, 0] += (self.grid.samples.T @ (data_residual * self.sample_weights)).ravel()
         response[:, 1 + len(columns) :] = self._pull
         response = -cho_solve_banded((factor, True), response, check_finite=False)
 
@@ -418,28 +402,22 @@ class Collocation:
 
     def factor(self, state: State) -> tuple[Floats, sparse.csr_array]:
         """That factor at a state, and the Jacobian of the weighted physics residual, (k d, r d)."""
-        nodes = self.node_states(state.control_points)
-        physics, _ = self._derivatives(state, np.array([], dtype=int), *nodes)
+        physics, _ = self._derivatives(state, np.array([], dtype=int))
         return self._factor(physics), physics
 
-    def _derivatives(
-        self, state: State, columns: Ints, x: Floats, slope: Floats
-    ) -> tuple[sparse.csr_array, Floats]:
-        """The weighted physics residual around a state, whose curve is at the nodes as given.
+    def _derivatives(self, state: State, columns: Ints) -> tuple[sparse.csr_array, Floats]:
+        """The weighted physics residual around a state.
 
         Its Jacobian in the control points, (k d, r d); and, side by side, (k d, 1 + m + s), the
         residual itself, its derivatives in the columns, and zeros for the systematic errors.
         """
         d, l = self.d, len(self.exponents)
+        x, slope = self.node_states(state.control_points)
         law = state.coefficients + self.known
-        z, below = law_variables(x - state.offset, self.functions, self.exponents, law)
-        terms = monomials(z, self.exponents)
+        terms, below, jacobian = linearised(x - state.offset, self.functions, self.exponents, law)
         root = np.sqrt(self.grid.node_weights[:, None] * self.physics_weights)
-        residual = root * (slope - terms @ law)
-        # (nodes, equation, coordinate): how the law changes with the state.
-        rates = (terms @ (self._generators @ law)).transpose(1, 2, 0)
+        residual, jacobian = root * (slope - terms @ law), root[:, :, None] * jacobian
         root = root / below
-        jacobian = root[:, :, None] * along_state(rates, x - state.offset, self.functions)
         # Minus the terms in their own equation, and the rates of the law for the offset.
         offset_columns = columns[columns >= d * l] - d * l
         term_columns = columns[columns < d * l]
@@ -515,15 +493,15 @@ class Collocation:
         return Fit(state, self, Status.MAX_STEPS)
 
 
-def _without_systematic(gram: Floats, sizes: Floats, share: float = 1.0) -> tuple[Floats, Floats]:
+def _without_systematic(gram: Floats, sizes: Floats) -> tuple[Floats, Floats]:
     """Eliminate the sizes of the systematic errors, which go with the law as the curve does.
 
-    They have mean 0 and variance 1, or, as all else is divided by ``share``, its inverse.
+    They have mean 0 and variance 1.
     """
     size = len(gram) - len(sizes)
     pull = gram[size:, :size].copy()
-    pull[:, 0] += sizes / share
-    shared = -np.linalg.solve(gram[size:, size:] + np.eye(len(sizes)) / share, pull)
+    pull[:, 0] += sizes
+    shared = -np.linalg.solve(gram[size:, size:] + np.eye(len(sizes)), pull)
     left = gram[:size, :size] + pull.T @ shared
-    left[0, 0] += sizes @ sizes / share
+    left[0, 0] += sizes @ sizes
     return left, np.asarray(shared, dtype=float)

@@ -32,7 +32,7 @@ from .library import (
 from .mechanics import FAINT, Complexes, Round, on_circle, on_sphere
 from .model import PolynomialSystem, place, spoken, sum_text
 from .noise import CONSISTENT, GROSS, passing, residual_noise
-from .problem import COARSE, FINAL_WEIGHT, Problem
+from .problem import COARSE, Problem
 from .result import Path
 
 # --------------------------------------------------------------------------------------------------
@@ -495,7 +495,7 @@ def elsewhere(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[Riv
     state, given = fit.state, problem.origin
     axes = np.eye(problem.d, dtype=bool)[state.moving]
     fewer = [(np.where(axis, given, state.offset), state.moving & ~axis) for axis in axes]
-    whole = closed(problem, fit, FINAL_WEIGHT)
+    whole = closed(problem, fit)
     every = problem.form.candidates | whole.state.active
     whole = replace(whole, state=replace(whole.state, active=every))
     own = problem.criterion(fit.collocation, state)
@@ -795,8 +795,7 @@ def _changing(problem: Problem, fit: Fit, tolerated: float, most: int = 8) -> It
     collocation, state = fit.collocation, fit.state
     grid, own = collocation.grid, np.flatnonzero(state.free())
     run_of = np.repeat([s.trajectory for s in grid.segments], [len(s.t) for s in grid.segments])
-    residual, _ = collocation.data_residual(state.control_points)
-    squares = (residual**2 * collocation.sample_weights).sum(axis=1)
+    squares = (fit.residual**2 * collocation.sample_weights).sum(axis=1)
     runs, place, counts = np.unique(run_of, return_inverse=True, return_counts=True)
     worst = runs[np.argsort(-np.bincount(place, squares) / counts)[:most]]
     here = grid.runs

@@ -18,7 +18,7 @@ from ..arrays import Bools, Floats, Ints
 from .collocation import Fit, State
 from .l0 import closest_rival, minimiser, subset_search
 from .library import divides, shift_generators, shift_matrix
-from .problem import Problem
+from .problem import FINAL_WEIGHT, Problem
 
 Origin = tuple[Floats, Bools]
 """An origin, and which of its axes are not where the data have theirs."""
@@ -96,7 +96,7 @@ def with_fewer_axes(problem: Problem, origin: Floats) -> list[Origin]:
     return [(np.where(mask, origin, given), np.array(mask)) for mask in masks]
 
 
-def closed(problem: Problem, fit: Fit, weight: float) -> Fit:
+def closed(problem: Problem, fit: Fit) -> Fit:
     """The law in the centred frame, with all terms of its shift closure: these are 0 as yet."""
     d, exponents = problem.d, problem.exponents
     state = replace(
@@ -106,7 +106,7 @@ def closed(problem: Problem, fit: Fit, weight: float) -> Fit:
         offset=np.zeros(d),
         moving=np.zeros(d, dtype=bool),
     )
-    return replace(fit, state=state, collocation=problem.weighted(fit.collocation, weight))
+    return replace(fit, state=state, collocation=problem.weighted(fit.collocation, FINAL_WEIGHT))
 
 
 def cheapest(problem: Problem, whole: Fit, origins: Sequence[Origin]) -> Fit:

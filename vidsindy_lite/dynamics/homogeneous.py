@@ -140,7 +140,9 @@ def homogeneous(
     if classes[best].theta[-1] > 0:  # no drag: it comes nearer; the constant force is doubted
         best -= 1
     flight, richer = classes[best], classes[min(best + 1, len(classes) - 1)]
-    covariance = _departure(flight, richer)
+    # Mean products of what the numbers of the richer law are off those of this one.
+    apart = richer.theta - flight.theta
+    covariance = (richer.covariance + np.outer(apart, apart)) * np.outer(flight.free, flight.free)
     penalty = chdtri(1, FALSE_ALARM / (2 * m))
     kept = flight.free & ((flight.theta**2 > penalty * np.diag(covariance)) | (numbers < 2 * m))
     law = Flight.fitted(since, x, kept)
@@ -159,12 +161,6 @@ def homogeneous(
         for j in range(found.system.d)
     )
     return replace(found, warnings=_doubt(flight, richer, penalty), path=path)
-
-
-def _departure(flight: Flight, richer: Flight) -> Floats:
-    """Mean products of what the numbers of a richer law are off those of a flight."""
-    apart = richer.theta - flight.theta
-    return (richer.covariance + np.outer(apart, apart)) * np.outer(flight.free, flight.free)
 
 
 def _doubt(flight: Flight, richer: Flight, penalty: float) -> tuple[str, ...]:

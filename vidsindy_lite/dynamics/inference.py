@@ -101,19 +101,19 @@ def infer(
     tolerable = np.outer(tolerated**2, problem.penalties).ravel()
     penalties = np.where(weighed, KEPT, tolerable)
     noise = problem.noise if problem.has_process_noise else residual_noise(fit)
+    span = sum(np.ptp(s.breakpoints) for s in collocation.segments) / len(collocation.grid.x)
     return Discovery(
         **_in_both_frames(problem, fit, model, offset, penalties),
         native=form.law(coefficients + form.known),
         offset=offset,
         noise=np.where(collocation.counts > 0, noise * units.scale, np.nan),
-        model_error=_kicks(problem, fit),
+        model_error=problem.process_noise * units.scale * np.sqrt(span / units.time),
         warnings=(),
         path=path.plateaus,
         history=tuple(history.steps),
         absent=intervals(problem, fit.state, model, tolerated),
         curves=tuple(
-            BSpline(s.t * units.time, s.c * units.scale + units.centre, DEGREE)
-            for s in collocation.grid.splines(state.control_points)
+            BSpline(s.t * units.time, s.c * units.scale + units.centre, DEGREE) for s in fit.splines
         ),
     )
 
@@ -140,13 +140,6 @@ def _in_both_frames(
         "native_covariance": covariance[:size, :size],
         "offset_errors": np.sqrt(np.diag(covariance)[size:]),
     }
-
-
-def _kicks(problem: Problem, fit: Fit) -> Floats:
-    """Standard deviation of what the kicks of a unit of time add, in units of the data, (d,)."""
-    grid, units = fit.collocation.grid, problem.units
-    span = sum(s.breakpoints[-1] - s.breakpoints[0] for s in grid.segments) / len(grid.x)
-    return problem.process_noise * units.scale * np.sqrt(span / units.time)
 
 
 def _covariance(units: Units, fit: Fit, model: Linearisation) -> Floats:

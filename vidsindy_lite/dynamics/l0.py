@@ -6,8 +6,7 @@ matrix: all matrices are scaled to a unit diagonal before they are solved or inv
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import itemgetter
 
@@ -15,10 +14,6 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 
-Change = tuple[float, Ints, Ints]
-"""Change of the function, entries dropped, entries added."""
-NONE = np.array([], dtype=int)
-"""No entries."""
 COLLINEAR = 1e-9
 """Share of a column that is not a combination of others, below which it is taken to be one."""
 NEGLIGIBLE = 1e-6
@@ -73,33 +68,9 @@ def subset_search(
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of columns that are all but combinations
-def subset_path(
-    functions: Iterable[tuple[Floats, Floats, float]],
-    present: Floats,
-    penalty: Floats,
-    start: Bools,
-) -> list[Bools]:
-    """The supports that `subset_search` finds of several functions, each from the one before.
-
-    Parameters
-    ----------
-    functions : iterable of (ndarray, ndarray, float)
-        Information, gradient, and what the function is multiplied by; the penalties are not.
-    present, penalty, start
-        See `subset_search`.
-    """
-    supports, known, model = [start], None, None
-    for information, gradient, share in functions:
-        if model is None or information is not known:
-            known, model = information, _Quadratic.of(information, gradient, present, penalty)
-        supports.append(_search(replace(model, share=share), supports[-1]).support)
-    return supports[1:]
-
-
-@np.errstate(over="ignore", invalid="ignore")  # of columns that are all but combinations
 def closest_rival(
     information: Floats, gradient: Floats, present: Floats, penalty: Floats, support: Bools
-) -> Change:
+) -> tuple[float, Ints, Ints]:
     """The other support that costs least, of those next to a support.
 
     Every entry has to leave or to join, in turn, and the others then leave and join as they like:
@@ -121,9 +92,7 @@ def closest_rival(
     """
     model = _Quadratic.of(information, gradient, present, penalty)
     rivals = [_forced(model, support, k) for k in np.flatnonzero(np.isfinite(penalty)).tolist()]
-    if not rivals:
-        return np.inf, NONE, NONE
-    value, rival = min(rivals, key=itemgetter(0))
+    value, rival = min(rivals, key=itemgetter(0), default=(np.inf, support))
     cost = value - model.value(model.fit(support))
     return cost, np.flatnonzero(support & ~rival), np.flatnonzero(rival & ~support)
 
@@ -188,10 +157,7 @@ class _Fit:
 
 @dataclass(frozen=True)
 class _Quadratic:
-    """A share of a quadratic function, with penalties, its entries scaled to a unit diagonal.
-
-    It remembers of each support what holds for all shares: nine of ten that a search tries have
-    been tried at the share before.
+    """A quadratic function with penalties, its entries scaled to a unit diagonal.
 
     Everything is reckoned from the present point: with data that are nearly exact the function
     itself has more digits than a computer, its changes do not.
@@ -202,8 +168,6 @@ class _Quadratic:
     gradient: Floats
     present: Floats
     penalty: Floats
-    share: float = 1.0
-    fits: dict[bytes, _Fit] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -214,23 +178,12 @@ class _Quadratic:
         return cls(matrix, scale, gradient * scale, present / scale, penalty)
 
     def value(self, fit: _Fit) -> float:
-        """The share of the function, and what entries cost but for those that must be there."""
+        """The function, and what entries cost but for those that must be there."""
         penalty = self.penalty[fit.inside]
-        return float(penalty[np.isfinite(penalty)].sum()) + self.share * fit.fall
+        return float(penalty[np.isfinite(penalty)].sum()) + fit.fall
 
     def fit(self, support: Bools) -> _Fit:
         """The minimum on a support."""
-        if (key := support.tobytes()) not in self.fits:
-            self.fits[key] = self._fitted(support)
-        return self.fits[key]
-
-    def solution(self, fit: _Fit) -> Floats:
-        """The minimiser, zero outside of the support, in units of its own entries."""
-        solution = np.zeros(len(self.scale))
-        solution[fit.inside] = fit.fitted * self.scale[fit.inside]
-        return solution
-
-    def _fitted(self, support: Bools) -> _Fit:
         inside = np.flatnonzero(support)
         block = self.matrix[inside[:, None], inside]
         inverse = np.asarray(np.linalg.inv(block), dtype=float)
@@ -243,6 +196,12 @@ class _Quadratic:
         left = self.gradient - self.matrix @ step
         fall, fitted = -float(step @ (left + self.gradient)), self.present[inside] + moved
         return _Fit(self.matrix, support, inside, inverse, fitted, left, fall)
+
+    def solution(self, fit: _Fit) -> Floats:
+        """The minimiser, zero outside of the support, in units of its own entries."""
+        solution = np.zeros(len(self.scale))
+        solution[fit.inside] = fit.fitted * self.scale[fit.inside]
+        return solution
 
 
 def _search(model: _Quadratic, start: Bools) -> _Fit:
@@ -258,10 +217,10 @@ def _descend(model: _Quadratic, start: Bools) -> _Fit:
     """Take the best of all drops, adds and swaps until none helps."""
     best = model.fit(start)
     while True:
-        change, dropped, added = _best_change(model, best)
+        change, entries = _best_change(model, best)
         if not change < -NEGLIGIBLE:
             return best
-        fit = model.fit(_changed(best.support, dropped, added))
+        fit = model.fit(_changed(best.support, entries))
         # Rounding may promise a fall that does not come: what counts is the value itself.
         if not model.value(fit) < model.value(best) - NEGLIGIBLE:
             return best
@@ -276,7 +235,7 @@ def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
     """
     room, left = np.maximum(best.room, COLLINEAR)[:, None], best.left[best.outside, None]
     fitted = best.fitted - best.response * (left / room)
-    lost = model.share * fitted**2 / (best.spread + best.response**2 / room)
+    lost = fitted**2 / (best.spread + best.response**2 / room)
     lets_go = (lost < model.penalty[best.inside]).any(axis=1)
     for entry in best.outside[lets_go & ~np.isposinf(model.penalty[best.outside])].tolist():
         value, support = _forced(model, best.support, entry)
@@ -289,36 +248,31 @@ def _forced(model: _Quadratic, support: Bools, entry: int) -> tuple[float, Bools
     """The value and support of a descent with an entry forced out of a support, or into it."""
     inside, penalty = support[entry], model.penalty.copy()
     penalty[entry] = np.inf if inside else -np.inf
-    changed = _changed(support, entry, NONE) if inside else _changed(support, NONE, entry)
     forced = replace(model, penalty=penalty)
-    trial = _descend(forced, changed)
+    trial = _descend(forced, _changed(support, [entry]))
     return forced.value(trial) + (0.0 if inside else model.penalty[entry]), trial.support
 
 
-def _changed(support: Bools, dropped: Ints | int, added: Ints | int) -> Bools:
+def _changed(support: Bools, entries: list[int]) -> Bools:
+    """A support without those of some entries that it has, and with the others."""
     changed = support.copy()
-    changed[dropped] = False
-    changed[added] = True
+    changed[entries] ^= True
     return changed
 
 
-def _best_change(model: _Quadratic, fit: _Fit) -> Change:
-    """The best of all drops, adds and swaps."""
-    inside, outside, share = fit.inside, fit.outside, model.share
-    lost, penalty = fit.fitted**2 / fit.spread, model.penalty[outside]
-    loss = share * lost - model.penalty[inside]
-    cost = penalty - share * fit.gained
-    changes = [(np.inf, NONE, NONE)]
-    if len(inside):
-        changes.append((loss.min(), inside[[loss.argmin()]], NONE))
-    if len(outside):
-        changes.append((cost.min(), NONE, outside[[cost.argmin()]]))
-    if len(inside) and len(outside):
-        swap = loss + penalty[:, None]
-        swap -= share * fit.gained_after
-        add, drop = divmod(int(swap.argmin()), len(inside))
-        changes.append((swap[add, drop], inside[[drop]], outside[[add]]))
-    return min(changes, key=lambda change: change[0])
+def _best_change(model: _Quadratic, fit: _Fit) -> tuple[float, list[int]]:
+    """The best of all drops, adds and swaps: change of the function, and whose places change."""
+    loss = fit.fitted**2 / fit.spread - model.penalty[fit.inside]
+    price = model.penalty[fit.outside]
+    # A row for each that joins, the first for none; a column for each that leaves, the same.
+    changes = np.full((1 + len(price), 1 + len(loss)), np.inf)
+    changes[0, 1:] = loss
+    changes[1:, 0] = price - fit.gained
+    changes[1:, 1:] = loss + price[:, None]
+    changes[1:, 1:] -= fit.gained_after
+    add, drop = divmod(int(np.nanargmin(changes)), 1 + len(loss))
+    entries = [*fit.inside[drop - 1 : drop].tolist(), *fit.outside[add - 1 : add].tolist()]
+    return float(changes[add, drop]), entries
 
 
 def _gain(left: Floats, room: Floats) -> Floats:

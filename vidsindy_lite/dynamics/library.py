@@ -8,14 +8,14 @@ import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from itertools import combinations_with_replacement
 from math import comb
 from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline, interp1d
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.linalg import block_diag
 from scipy.special import comb as binomial
 
 from ..arrays import Bools, Floats, Ints
@@ -106,42 +106,28 @@ def extended(x: Floats, functions: Sequence[Function]) -> Floats:
     return np.column_stack([x, *(f.value(x) for f in functions)]) if functions else x
 
 
-def law_variables(
+def law_terms(
     x: Floats, functions: Sequence[Function], exponents: Ints, law: Floats
 ) -> tuple[Floats, Floats]:
-    """All that the monomials of a law, (l, d), are made of at points (n, d), and its denominators.
+    """The monomials of a law, (l, d), at points (n, d), and its denominators.
 
     Where exponents leave room for slopes, terms with a slope, ``b psi(x) x'``, are those that a
     denominator ``1 - b psi`` brings over: the slopes are what the law makes them.
 
     Returns
     -------
-    variables : ndarray, shape (n, d + k) or (n, 2 d + k)
+    terms : ndarray, shape (n, l)
     denominators : ndarray, shape (n, d), or (1, d) if all are 1
     """
     d, z = x.shape[1], extended(x, functions)
     if exponents.shape[1] == z.shape[1]:
-        return z, np.ones((1, d))
+        return monomials(z, exponents), np.ones((1, d))
     z = np.column_stack([z, np.ones_like(x)])
     implicit, terms = exponents[:, -d:].any(axis=1), monomials(z, exponents)
     below = 1 - terms[:, implicit] @ law[implicit]
     with np.errstate(divide="ignore", invalid="ignore"):  # at a pole
         z[:, -d:] = (terms[:, ~implicit] @ law[~implicit]) / below
-    return z, below
-
-
-def along_state(rates: Floats, x: Floats, functions: Sequence[Function]) -> Floats:
-    """Derivatives in coordinates and functions, (n, m, >= d + k), as those in coordinates alone.
-
-    The chain rule: (n, m, d).
-    """
-    d = x.shape[1]
-    total = rates[:, :, :d]
-    for k, function in enumerate(functions):
-        rate = rates[:, :, d + k, None]
-        if rate.any():  # those that are in no term may be infinite
-            total = total + rate * function.gradient(x)[:, None, :]
-    return total
+    return monomials(z, exponents), below
 
 
 def monomial_exponents(d: int, degree: int) -> Ints:
@@ -201,16 +187,9 @@ def shift_matrix(exponents: Ints, offset: Floats, rows: Ints | slice = slice(Non
     """
     still = np.zeros((*offset.shape[:-1], exponents.shape[1] - offset.shape[-1]))
     moved = -np.concatenate([offset, still], axis=-1)[..., None, None, :]
-    factors, lowered = _binomials(exponents.tobytes(), *exponents.shape)
-    return (factors[rows] * moved ** lowered[rows]).prod(axis=-1)
-
-
-@lru_cache(maxsize=64)
-def _binomials(exponents: bytes, l: int, d: int) -> tuple[Floats, Ints]:
-    powers = np.frombuffer(exponents, dtype=int).reshape(l, d)
-    lowered = powers[None, :, :] - powers[:, None, :]
-    factors = np.where(lowered >= 0, binomial(powers[None, :, :], powers[:, None, :]), 0.0)
-    return factors, np.maximum(lowered, 0)
+    high, low = exponents[None, :, :], exponents[:, None, :]
+    factors = binomial(high, low)  # zero where no power is left
+    return (factors[rows] * moved ** np.maximum(high - low, 0)[rows]).prod(axis=-1)
 
 
 def closure(exponents: Ints) -> Ints:
@@ -226,16 +205,14 @@ def places_of(wanted: Ints, exponents: Ints) -> Ints:
     return np.array([row[tuple(powers)] for powers in wanted.tolist()], dtype=int)
 
 
-def divides(exponents: Ints, axes: Bools | None = None) -> Bools:
+def divides(exponents: Ints, axes: Bools) -> Bools:
     """Which monomial (row) divides which (column), itself included; shape (l, l).
 
-    If axes are given, bool (d,), along these only: along the others both have the same power.
+    Along the given axes, bool (d,): along the others both have the same power.
     """
-    if axes is not None:
-        axes = np.append(axes, np.zeros(exponents.shape[1] - len(axes), dtype=bool))
+    along = np.append(axes, np.zeros(exponents.shape[1] - len(axes), dtype=bool))
     row, column = exponents[:, None, :], exponents[None, :, :]
-    lower = row < column if axes is None else axes & (row < column)
-    return np.all((row == column) | lower, axis=-1)
+    return np.all((row == column) | along & (row < column), axis=-1)
 
 
 def shift_generators(exponents: Ints) -> Floats:
@@ -253,6 +230,29 @@ def shift_generators(exponents: Ints) -> Floats:
     )
 
 
+def linearised(
+    x: Floats, functions: Sequence[Function], exponents: Ints, law: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """A law, (l, d), around points (n, d), of a library with all divisors of its monomials.
+
+    Returns
+    -------
+    terms : ndarray, shape (n, l)
+    denominators : ndarray, shape (n, d), or (1, d) if all are 1
+    jacobian : ndarray, shape (n, d, d)
+        Derivatives of each equation in each coordinate.
+    """
+    d = x.shape[1]
+    terms, below = law_terms(x, functions, exponents, law)
+    rates = (terms @ (shift_generators(exponents) @ law)).transpose(1, 2, 0)
+    total = rates[:, :, :d]
+    for k, function in enumerate(functions):  # by the chain rule
+        rate = rates[:, :, d + k, None]
+        if rate.any():  # those that are in no term may be infinite
+            total = total + rate * function.gradient(x)[:, None, :]
+    return terms, below, total / below[:, :, None]
+
+
 # --------------------------------------------------------------------------------------------------
 # Measured inputs: known functions of the time, such as a force that somebody applies.
 
@@ -263,13 +263,13 @@ class Input:
 
     Parameters
     ----------
-    pieces : tuple of CubicSpline or interp1d
+    pieces : tuple of BSpline
         One a trajectory.
     unsure : ndarray, shape (k, 2)
         Times of samples between which it jumps, nobody knows when.
     """
 
-    pieces: tuple[CubicSpline | interp1d, ...]
+    pieces: tuple[BSpline, ...]
     unsure: Floats
 
     @classmethod
@@ -289,7 +289,7 @@ class Input:
         check_items(f"inputs: {name}", runs, len(times), "trajectory")
         found = [_curve(name, part, run, hold) for part, run in zip(times, runs, strict=True)]
         pieces = [curve for curve, _ in found]
-        ends = sorted((spline.x[0], spline.x[-1]) for spline in pieces)
+        ends = sorted((spline.t[0], spline.t[-1]) for spline in pieces)
         for (_, last), (first, _) in zip(ends[:-1], ends[1:], strict=True):
             if not last < first:
                 raise ValueError(
@@ -299,20 +299,22 @@ class Input:
         return cls(tuple(pieces), np.concatenate([unsure for _, unsure in found]))
 
     def __call__(self, t: Floats) -> Floats:
-        """The values at times (n,); NaN where it was not measured, but for rounding at the ends."""
-        t = np.asarray(t, dtype=float)
-        values = np.full(t.shape, np.nan)
-        for spline in self.pieces:
-            low, high = spline.x[0], spline.x[-1]
-            slack = 1e-6 * (high - low)
-            inside = (t >= low - slack) & (t <= high + slack)
-            values[inside] = spline(np.clip(t[inside], low, high))
-        return values
+        """The values at times (n,); NaN where it was not measured."""
+        return of_pieces(self.pieces, np.asarray(t, dtype=float))
 
 
-def _curve(
-    name: str, t: Floats, values: Floats, hold: str | None
-) -> tuple[CubicSpline | interp1d, Floats]:
+def of_pieces(pieces: Sequence[BSpline], t: Floats) -> Floats:
+    """What curves of times apart are at times (n,); NaN beyond, but for rounding at their ends."""
+    values = np.full((*t.shape, *pieces[0].c.shape[1:]), np.nan)
+    for curve in pieces:
+        low, high = curve.t[0], curve.t[-1]
+        slack = 1e-6 * (high - low)
+        inside = (t >= low - slack) & (t <= high + slack)
+        values[inside] = curve(np.clip(t[inside], low, high))
+    return values
+
+
+def _curve(name: str, t: Floats, values: Floats, hold: str | None) -> tuple[BSpline, Floats]:
     """The curve through samples, which are checked, and between which it jumps at no known time."""
     t, values = check_times(t), check_array("inputs", values)
     if values.shape != t.shape:
@@ -322,12 +324,14 @@ def _curve(
     if not np.isfinite(values).all():
         first = t[np.argmin(np.isfinite(values))]
         raise ValueError(f"inputs: {name} must be finite, got NaN or infinity at t = {first:g}")
-    curve, line, unsure = CubicSpline(t, values), interp1d(t, values), np.zeros((0, 2))
+    degrees, unsure = {"zero": 0, "linear": 1, "cubic": min(3, len(t) - 1)}, np.zeros((0, 2))
+    curves = {kind: make_interp_spline(t, values, degree) for kind, degree in degrees.items()}
     if hold is None:
         middles, steps = (t[1:] + t[:-1]) / 2, np.abs(np.diff(values))
         # Midway a cubic is so far from a line at six samples of a sine a period: more is a guess.
         much = 0.1 * values.std()
-        hold = "zero" if (np.abs(curve(middles) - line(middles)) > much).any() else "cubic"
+        bend = np.abs(curves["cubic"](middles) - curves["linear"](middles))
+        hold = "zero" if (bend > much).any() else "cubic"
         if hold == "zero":
             unsure = np.column_stack([t[:-1], t[1:]])[steps > much]
             warnings.warn(
@@ -338,8 +342,7 @@ def _curve(
                 "hold='zero', or what is true by 'linear' or 'cubic'",
                 stacklevel=2,
             )
-    kinds = {"zero": interp1d(t, values, "previous"), "linear": line, "cubic": curve}
-    return kinds[hold], unsure
+    return curves[hold], unsure
 
 
 def jumps(value: Callable[[Floats], Floats], t: Floats, halvings: int = 30) -> Floats:
@@ -646,9 +649,7 @@ class Library:
         powers = np.empty((0, d), dtype=int)
         if self.degree is not None:
             powers = np.pad(monomial_exponents(states, self.degree), ((0, 0), (0, d - states)))
-        exponents = np.zeros((len(powers) + len(functions), d + len(functions)), dtype=int)
-        exponents[: len(powers), :d] = powers
-        exponents[len(powers) :, d:] = np.eye(len(functions), dtype=int)
+        exponents = block_diag(powers, np.eye(len(functions), dtype=int))
         if self.denominators:
             exponents = np.pad(exponents, ((0, 0), (0, d)))
             below = monomial_exponents(states, self.denominators)[1:]
@@ -660,19 +661,16 @@ class Library:
 
     def _check_size(self, states: int, measured: int, most: int = 1000) -> None:
         """Refuse more terms than a search can try to an end, before they are listed."""
-        counts = [
-            ("monomials", comb(states + degree, states), f"of degree {degree}")
-            for degree in (self.degree or 0, self.denominators)
-        ]
-        waves = 2 * self.harmonics * measured
-        for what, count, which in [
-            *counts, ("sines and cosines", waves, f"of {self.harmonics} multiples")
-        ]:  # fmt: skip
-            if count > most:
-                raise ValueError(
-                    f"library: must have at most {most} {what}, got {count} {which} in {states} "
-                    "variables"
-                )
+        degree, waves = max(self.degree or 0, self.denominators), 2 * self.harmonics * measured
+        count, what, which = max(
+            (comb(states + degree, states), "monomials", f"of degree {degree}"),
+            (waves, "sines and cosines", f"of {self.harmonics} multiples"),
+        )
+        if count > most:
+            raise ValueError(
+                f"library: must have at most {most} {what}, got {count} {which} in {states} "
+                "variables"
+            )
 
 
 def check_library(degree: int | None, library: Library | None) -> Library:

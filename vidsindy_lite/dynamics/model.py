@@ -31,15 +31,13 @@ from .library import (
     OTHERS,
     Function,
     Library,
-    along_state,
     check_mapping,
     closure,
     extended,
-    law_variables,
-    monomials,
+    law_terms,
+    linearised,
     name_latex,
     places_of,
-    shift_generators,
     shift_matrix,
     velocity_names,
 )
@@ -360,10 +358,10 @@ class PolynomialSystem:
     @cached_property
     def factors(self) -> tuple[str, ...]:
         """The same names without the slopes that terms hold."""
-        return self._named(("1",) * self.d)
+        return self._named(())
 
     def _named(self, slopes: tuple[str, ...]) -> tuple[str, ...]:
-        """Names of the monomials, given those of the slopes; factors of 1 are left out.
+        """Names of the monomials, given those of the slopes; without these, if none are.
 
         A blank sets apart what has more than a letter, and all if a function is named like a
         product of variables.
@@ -430,8 +428,7 @@ class PolynomialSystem:
 
     def library(self, x: Floats) -> Floats:
         """Candidate terms ``phi(x)``: (n, d) points to (n, l) values; slopes are the law's."""
-        z, _ = law_variables(self._points(x), self.functions, self.exponents, self.coefficients)
-        return monomials(z, self.exponents)
+        return law_terms(self._points(x), self.functions, self.exponents, self.coefficients)[0]
 
     def __call__(self, x: Floats) -> Floats:
         """Time derivative at ``x``, shape (n, d) or (d,), in state units per time unit."""
@@ -453,9 +450,7 @@ class PolynomialSystem:
         """
         x = check_array("x", x)
         points, (exponents, law) = self._points(np.atleast_2d(x)), self._own._closed
-        z, below = law_variables(points, self.functions, exponents, law)
-        rates = (monomials(z, exponents) @ (shift_generators(exponents) @ law)).transpose(1, 2, 0)
-        jacobian = along_state(rates, points, self.functions) / below[:, :, None]
+        _, _, jacobian = linearised(points, self.functions, exponents, law)
         return jacobian.reshape(*x.shape, self.d)
 
     def shift(self, offset: Sequence[float] | Floats) -> PolynomialSystem:
@@ -587,7 +582,7 @@ class PolynomialSystem:
             names = names[:m] + tuple(left[j] for j in range(m)) + names[2 * m :]
             left |= {m + j: rf"\ddot{{{names[j]}}}" for j in range(m)}
         left = {j: left[j] for j in self.sides()}
-        names += tuple(function.latex for function in self.functions) + ("1",) * self.d
+        names += tuple(function.latex for function in self.functions)
         terms = [_term_text(e, names, "{}^{{{}}}", 0) for e in self.exponents]
         rows = (
             f"{side} &= " + self._right(j, terms, digits, r"\frac{{{}}}{{{}}}", r"\,")
@@ -626,10 +621,13 @@ def parse_term(term: str, names: tuple[str, ...]) -> tuple[int, ...]:
 
 
 def _term_text(exponents: Ints, names: tuple[str, ...], power: str, letters: int) -> str:
-    """A monomial as text, given how a power is written; a blank beside names of more letters."""
+    """A monomial as text, given how a power is written; a blank beside names of more letters.
+
+    Factors beyond those that have names are left out.
+    """
     text, before = "", ""
     for name, e in zip(names, exponents, strict=False):
-        if e and name != "1":
+        if e:
             apart = text and max(len(before), len(name.rstrip("'"))) > letters
             text += (" " if apart else "") + (name if e == 1 else power.format(name, e))
             before = name.rstrip("'")

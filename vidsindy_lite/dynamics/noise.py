@@ -37,8 +37,7 @@ def _spread(fit: Fit) -> Floats:
     """
     collocation, seen = fit.collocation, fit.collocation.counts > 0
     used = fit.state.free().sum() / seen.sum() + len(collocation.segments)
-    residual, _ = collocation.data_residual(fit.state.control_points)
-    squares = (residual**2 * collocation.precision).sum(axis=0)[seen]
+    squares = (fit.residual**2 * collocation.precision).sum(axis=0)[seen]
     spread = np.sqrt(squares / np.maximum(collocation.counts[seen] - used, 1.0))
     return spread_to_unseen(spread, seen)
 
@@ -68,8 +67,7 @@ def errors_left(problem: Problem, fit: Fit) -> Floats:
 def _errors_seen(fit: Fit) -> list[list[Floats]]:
     """Residuals of each coordinate, of precision 1, where it was seen: a column a stretch."""
     collocation = fit.collocation
-    residual, _ = collocation.data_residual(fit.state.control_points)
-    residual *= np.sqrt(collocation.precision)
+    residual = fit.residual * np.sqrt(collocation.precision)
     residual[np.isnan(collocation.grid.x)] = np.nan
     stretches = collocation.grid.split(residual)
     return [
@@ -85,13 +83,11 @@ def time_inflation(fit: Fit) -> float:
     the path, together: at most the root of their number.
     """
     collocation = fit.collocation
-    residual, _ = collocation.data_residual(fit.state.control_points)
-    splines = collocation.grid.splines(fit.state.control_points)
-    pairs = zip(splines, collocation.segments, strict=True)
+    pairs = zip(fit.splines, collocation.segments, strict=True)
     slopes = np.concatenate([spline(segment.t, 1) for spline, segment in pairs])
     seen = collocation.counts > 0
     scale = (np.sqrt(collocation.precision) / residual_noise(fit))[:, seen]
-    residual, slopes = residual[:, seen] * scale, slopes[:, seen] * scale
+    residual, slopes = fit.residual[:, seen] * scale, slopes[:, seen] * scale
     along = (residual * slopes).sum(axis=1) ** 2 / np.maximum((slopes**2).sum(axis=1), LEAST)
     apart = (residual**2).sum(axis=1) / np.maximum((scale > 0).sum(axis=1), 1)
     ratio = float(along.sum() / np.maximum(apart.sum(), LEAST))
@@ -169,14 +165,14 @@ def smoother_weights(problem: Problem) -> Problem:
     """
     if problem.measured_errors:
         return problem
-    steps, path, left_over = 1e-3, [], []
-    for (_, (t, x)), curve in zip(problem.stretches, problem.curves, strict=True):
-        path.append(np.stack([curve(t), (curve(t + steps) - curve(t - steps)) / (2 * steps)]))
-        left_over.append(path[-1][0] - x)
-    residual = np.nan_to_num(np.concatenate(left_over))
-    observed = np.isfinite(np.concatenate([x for _, (_, x) in problem.stretches]))
-    signal, speed = np.concatenate(path, axis=1)
-    causes = [(signal - problem.origin) ** 2, speed**2]  # what the variance of the noise may follow
+    step, curves = 1e-3, list(zip(problem.curves, problem.stretches, strict=True))
+    behind, signal, ahead = (
+        np.concatenate([curve(t + by) for curve, (_, (t, _)) in curves]) for by in (-step, 0, step)
+    )
+    x = np.concatenate([values for _, (_, values) in problem.stretches])
+    residual, observed = np.nan_to_num(signal - x), np.isfinite(x)
+    # What the variance of the noise may follow: place and speed.
+    causes = [(signal - problem.origin) ** 2, ((ahead - behind) / (2 * step)) ** 2]
     spread = np.sqrt((residual**2).sum(axis=0) / np.maximum(observed.sum(axis=0), 1))
     factors, noise = np.ones_like(residual), problem.noise.copy()
     for j in np.flatnonzero(spread > 1e-4):  # below are the errors of splines
@@ -270,7 +266,7 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     every = replace(_on_knots(start, fit), active=problem.form.candidates)
     # What is known of a law (the slope of a position is the velocity) holds exactly.
     physics = np.where(free, 1.0, FINAL_WEIGHT) * start.physics_weights
-    kicked = _balanced(problem, start.weighted(start.data_weights, physics), every, rng)
+    kicked = _balanced(problem, replace(start, physics_weights=physics), every, rng)
     if like_kicks(kicked, free, rng) < 0.01:
         return None
     exact = _measured_badly(problem, fit, segments)
@@ -311,14 +307,13 @@ def _measured_badly(problem: Problem, fit: Fit, segments: list[Segment]) -> Fit:
     """The exact law on other knots, at the errors that it leaves."""
     grid = problem.collocation(segments, residual_noise(fit))
     exact = problem.weighted(grid, FINAL_WEIGHT).solve(_on_knots(grid, fit))
-    own = exact.collocation.weighted(residual_noise(exact) ** -2, exact.collocation.physics_weights)
+    own = replace(exact.collocation, data_weights=residual_noise(exact) ** -2)
     return own.solve(exact.state)
 
 
 def _on_knots(collocation: Collocation, fit: Fit) -> State:
     """The state of a fit on other knots."""
-    curves = fit.collocation.grid.splines(fit.state.control_points)
-    return replace(fit.state, control_points=fit_curves(collocation, curves))
+    return replace(fit.state, control_points=fit_curves(collocation, fit.splines))
 
 
 def _balanced(
@@ -346,8 +341,7 @@ def _balanced(
         solved = cho_solve_banded((factor, True), probes)
         in_law = ((physics @ probes) * (physics @ solved)).mean(axis=1).reshape(-1, d).sum(axis=0)
         in_data = _measurements_used(collocation, probes, solved)
-        residual, _ = collocation.data_residual(state.control_points)
-        missed = (collocation.precision * residual**2).sum(axis=0)
+        missed = (collocation.precision * fit.residual**2).sum(axis=0)
         kicked = grid.node_weights @ collocation.physics_residual(state) ** 2
         data = np.maximum(collocation.counts - in_data, 1.0) / np.maximum(missed, LEAST)
         law = np.maximum(unfitted - in_law, 1.0) / np.maximum(kicked, LEAST)
@@ -356,7 +350,7 @@ def _balanced(
         law = np.where(free, law, collocation.physics_weights)
         data, law = np.minimum(data, CLEANEST**-2), np.minimum(law, hardest)
         change = np.log([data / collocation.data_weights, law / collocation.physics_weights])
-        collocation = collocation.weighted(data, law)
+        collocation = replace(collocation, data_weights=data, physics_weights=law)
         if (np.abs(change) < 0.1).all():
             break
     return collocation.solve(state, tolerance=1.0)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import permutations, product
 from math import comb
 from operator import itemgetter
 
@@ -232,12 +231,8 @@ def apart(turn: Floats, other: Floats) -> float:
 def nearest(turn: Floats) -> Floats:
     """The same axes in the order and with the signs that are nearest to the data's own."""
     m = len(turn)
-    rows = (
-        np.array(signs)[:, None] * turn[list(order)]
-        for order in permutations(range(m))
-        for signs in product([1.0, -1.0], repeat=m)
-    )
-    return max((axes for axes in rows if np.linalg.det(axes) > 0), key=np.trace)
+    quarters = Rotation.create_group("O" if m == 3 else "C4").as_matrix()[:, :m, :m]
+    return max(np.round(quarters) @ turn, key=np.trace)
 
 
 def check_orientation(orientation: str, library: Library, d: int, origin: str) -> None:

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -30,7 +31,7 @@ from ..arrays import Bools, Floats
 from .bspline import Segment
 from .collocation import Fit, State, Status
 from .frames import Origin, cheapest, closed, free_offsets, with_fewer_axes
-from .l0 import NEGLIGIBLE, STRONG, inverse, minimiser, subset_path, subset_search
+from .l0 import NEGLIGIBLE, STRONG, inverse, minimiser, subset_search
 from .model import PolynomialSystem, runge_kutta_4
 from .noise import (
     CONSISTENT,
@@ -48,6 +49,7 @@ from .problem import (
     fit_curves,
     leaves_something_over,
     tightened,
+    typical,
     unpruned,
 )
 from .result import History, Path, Plateau
@@ -88,14 +90,12 @@ def follow(problem: Problem, fit: Fit) -> Path:
     count = int(np.ceil(np.log10(LARGEST / lowest) / STEP))
     # What has to be tolerated is asked itself: a plateau may begin just below it.
     levels = np.union1d(np.geomspace(lowest, LARGEST, count + 1), min(level, LARGEST))
-    shares = [(own / low) ** 2 for low in levels[:-1].tolist()]
-    tolerating = [model.tolerating(share) for share in shares]
-    functions = [
-        (m.information, m.gradient, share) for m, share in zip(tolerating, shares, strict=True)
-    ]
-    searched = subset_path(functions, present, problem.costs(columns), support)
-    flat = np.zeros((len(searched), problem.form.candidates.size), dtype=bool)
-    flat[:, problem.form.searched] = np.array(searched)[:, : len(problem.form.searched)]
+    flat = np.zeros((len(levels) - 1, problem.form.candidates.size), dtype=bool)
+    for terms, low in zip(flat, levels[:-1].tolist(), strict=True):
+        at = model.tolerating((own / low) ** 2)
+        costs = problem.costs(columns)
+        support, _, _ = subset_search(at.information, at.gradient, present, costs, support)
+        terms[problem.form.searched] = support[: len(problem.form.searched)]
     laws = flat[:, problem.form.shared].reshape(len(flat), problem.d, -1)
     plateaus = (_plateaus(j, levels.tolist(), laws[:, j]) for j in range(problem.d))
     return Path(fit, model, own, level, tuple(plateaus))
@@ -106,11 +106,6 @@ def _plateaus(equation: int, levels: list[float], laws: Bools) -> tuple[Plateau,
     changes = np.flatnonzero((laws[1:] != laws[:-1]).any(axis=1)) + 1
     ends = pairwise([0, *changes.tolist(), len(laws)])
     return tuple(Plateau(equation, levels[low], levels[high], laws[low]) for low, high in ends)
-
-
-def typical(noise: Floats) -> float:
-    """One number for the errors of all coordinates: their geometric mean."""
-    return float(np.exp(np.log(noise).mean()))
 
 
 # ------------------------------------------------------------------------------------ a first law
@@ -201,7 +196,7 @@ def _moved(problem: Problem, fit: Fit, origins: Sequence[Origin], history: Histo
     others = [there for there in origins if (there[1] != fit.state.moving).any()]
     if not others:
         return fit
-    start = cheapest(problem, closed(problem, fit, FINAL_WEIGHT), others)
+    start = cheapest(problem, closed(problem, fit), others)
     if not start.criterion < fit.criterion + problem.penalties.max():
         return fit
     start = start.collocation.solve(start.state)  # its curve is still that of the frame before
@@ -285,8 +280,7 @@ def deepest(
         if near(problem, path.fit) or history.over:
             break
         tolerant = replace(problem, noise=np.maximum(problem.noise, errors / descent))
-        collocation = path.fit.collocation
-        weighted = collocation.weighted(tolerant.noise**-2, collocation.physics_weights)
+        weighted = replace(path.fit.collocation, data_weights=tolerant.noise**-2)
         start = replace(path.fit, collocation=weighted)
         fit = select(tolerant, start, FINAL_WEIGHT, "a smaller error", history)
         fit = at_own_errors(problem, framed(tolerant, fit, history))
@@ -313,8 +307,7 @@ def at_own_errors(problem: Problem, fit: Fit) -> Fit:
     fit = replace(fit, collocation=problem.along(fit.collocation, fit.state))
     collocation = problem.weighted(fit.collocation, FINAL_WEIGHT)
     for _ in range(2):
-        weights = errors_left(problem, fit) ** -2
-        weighted = collocation.weighted(weights, collocation.physics_weights)
+        weighted = replace(collocation, data_weights=errors_left(problem, fit) ** -2)
         fit = weighted.solve(fit.state, tolerance=0.1, max_steps=10)
         if fit.status is not Status.CONVERGED:  # it creeps where the law is held too firmly
             fit = tightened(problem, weighted, fit.state)
@@ -348,7 +341,7 @@ def _refitted(tolerant: Problem, path: Path, goal: Sequence[Plateau], history: H
     """The law of these plateaus, fitted and framed where they begin."""
     fit = path.fit
     active = fit.state.whole(np.stack([plateau.terms for plateau in goal], axis=1))
-    collocation = fit.collocation.weighted(tolerant.noise**-2, fit.collocation.physics_weights)
+    collocation = replace(fit.collocation, data_weights=tolerant.noise**-2)
     trial = tightened(tolerant, collocation, _restricted(path, active))
     trial = replace(trial, criterion=tolerant.criterion(trial.collocation, trial.state))
     if not np.isfinite(trial.criterion):
@@ -378,8 +371,7 @@ def polish(problem: Problem, fit: Fit, history: History, most: int = 4) -> Fit:
         before = fit.state.flat()[columns]
         segments = [segment.refined() for segment in fit.collocation.segments]
         finer = problem.collocation(segments, errors_left(problem, fit))
-        splines = fit.collocation.grid.splines(fit.state.control_points)
-        state = replace(fit.state, control_points=fit_curves(finer, splines))
+        state = replace(fit.state, control_points=fit_curves(finer, fit.splines))
         fit = problem.weighted(problem.along(finer, state), FINAL_WEIGHT).solve(state, EXACT)
         information = fit.collocation.linearise(fit.state, columns).information
         spread = np.sqrt(np.diag(inverse(information)))
@@ -401,8 +393,7 @@ def bridged(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
     whose bridges spoil the fit is halved, down to single gaps.
     """
     law = problem.law(fit.state).shift(fit.state.offset)
-    splines = fit.collocation.grid.splines(fit.state.control_points)
-    joined, curves = join(problem, fit.collocation.segments, splines, law, group)
+    joined, curves = join(problem, fit.collocation.segments, fit.splines, law, group)
     whole = problem.collocation(joined)
     start = replace(fit.state, control_points=fit_curves(whole, curves))
     trial = tightened(problem, whole, start)
@@ -500,15 +491,10 @@ def join(
         else:
             joined.append(segment)
             curves.append([spline])
-    return joined, [_end_to_end(pieces) for pieces in curves]
+    return joined, [partial(_end_to_end, pieces) for pieces in curves]
 
 
-def _end_to_end(pieces: Sequence[BSpline]) -> Callable[[Floats], Floats]:
-    """Curves one after the other as a function of increasing times, (n,)."""
-    ends = [piece.t[-1] for piece in pieces[:-1]]
-
-    def states(t: Floats) -> Floats:
-        parts = np.split(t, np.searchsorted(t, ends, side="right"))
-        return np.concatenate([piece(part) for piece, part in zip(pieces, parts, strict=True)])
-
-    return states
+def _end_to_end(pieces: Sequence[BSpline], t: Floats) -> Floats:
+    """Curves one after the other at increasing times, (n,)."""
+    parts = np.split(t, np.searchsorted(t, [piece.t[-1] for piece in pieces[:-1]], side="right"))
+    return np.concatenate([piece(part) for piece, part in zip(pieces, parts, strict=True)])

@@ -9,18 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.interpolate import BSpline, make_lsq_spline
 from scipy.special import chdtri
 
 from ..arrays import Bools, Floats, Ints
-from .bspline import DEGREE, PENALTIES, Segment, smooth
+from .bspline import DEGREE, PENALTIES, Grid, Segment, smooth
 from .collocation import CLEANEST, Collocation, Fit, State, Status, WithCurve
 from .data import Trajectory, Units, cut, typical_step, typical_steps
 from .l0 import LEAST
-from .library import Function, extended, jumps, law_variables, monomials
+from .library import Function, extended, jumps, law_terms, monomials
 from .model import Form, PolynomialSystem
 
 FALSE_ALARM = 0.02
@@ -114,8 +114,7 @@ class Problem:
 
     def terms(self, x: Floats) -> Floats:
         """All candidate terms at standard points, (n, l); those with a slope are 0."""
-        z, _ = law_variables(x, self.functions, self.exponents, np.zeros(self.known.shape))
-        return monomials(z, self.exponents)
+        return law_terms(x, self.functions, self.exponents, np.zeros(self.known.shape))[0]
 
     @property
     def known(self) -> Floats:
@@ -218,9 +217,9 @@ class Problem:
         precision, smoothed = (self._at(segments, x) for x in (self.precision, self.smoothed))
         shared = self._shared_at(segments, smoothed)
         weights = (self.noise if noise is None else noise) ** -2
-        return Collocation.of(
-            segments, self.exponents, weights, np.ones(self.d), shared, precision, self.known,
-            self.functions,
+        return Collocation(
+            Grid.of(segments), self.exponents, weights, precision, np.ones(self.d), shared,
+            self.known, self.functions,
         )  # fmt: skip
 
     def along(self, collocation: Collocation, state: State) -> Collocation:
@@ -244,7 +243,7 @@ class Problem:
     def weighted(self, collocation: Collocation, weight: float) -> Collocation:
         """The same with another physics weight, relative to the slack, as far as kicks allow."""
         physics = 1.0 / np.maximum(self.slack**2 / weight, self.process_noise**2)
-        return collocation.weighted(collocation.data_weights, physics)
+        return replace(collocation, physics_weights=physics)
 
     @property
     def has_process_noise(self) -> bool:
@@ -294,9 +293,14 @@ def term_penalties(
     return chdtri(1, false_alarm / rivals)
 
 
+def typical(noise: Floats) -> float:
+    """One number for the errors of all coordinates: their geometric mean."""
+    return float(np.exp(np.log(noise).mean()))
+
+
 def spread_to_unseen(noise: Floats, seen: Bools) -> Floats:
     """The errors of the coordinates that were observed, their geometric mean for the others."""
-    filled = np.full(len(seen), np.exp(np.log(np.maximum(noise, CLEANEST)).mean()))
+    filled = np.full(len(seen), typical(np.maximum(noise, CLEANEST)))
     filled[seen] = noise
     return filled
 
@@ -417,15 +421,12 @@ def with_unseen(
     centre[measured], scale[measured] = units.centre, units.scale
     scale[-1] = units.time if timed else scale[-1]
 
-    def standard(curve: BSpline) -> Callable[[Floats], Floats]:
-        def states(t: Floats) -> Floats:
-            x = (whole(curve, t) - centre) / scale
-            x[:, measured] = curve(t)
-            return x
+    def standard(curve: BSpline, t: Floats) -> Floats:
+        x = (whole(curve, t) - centre) / scale
+        x[:, measured] = curve(t)
+        return x
 
-        return states
-
-    return [standard(curve) for curve in curves], Units(centre, scale, units.time)
+    return [partial(standard, curve) for curve in curves], Units(centre, scale, units.time)
 
 
 def _telling(form: Form, seen: Bools, u: int) -> tuple[int, int]:

@@ -24,7 +24,7 @@ from ..values import built, decoded, encoded
 from .bspline import smooth
 from .collocation import Fit, WithCurve
 from .data import Trajectory
-from .library import Function, Library, extended
+from .library import Function, Library, extended, of_pieces
 from .mechanics import Physics, Quantity, Round, on_circle, physics_of
 from .model import PolynomialSystem, place, with_error
 from .problem import Problem
@@ -186,7 +186,7 @@ class History:
     def add(self, stage: str, problem: Problem, fit: Fit, weight: float) -> None:
         """Add what a fit at a relative physics weight has reached."""
         state, collocation = fit.state, fit.collocation
-        data = collocation.data_loss(collocation.curve(state.control_points))
+        data = collocation.data_loss(state.control_points)
         self.steps.append(
             Step(
                 stage=stage,
@@ -346,14 +346,7 @@ class Discovery:
 
     def curve(self, t: Floats) -> Floats:
         """The fitted curve, shape (n, d), in the frame of the data; NaN outside the stretches."""
-        t = check_array("t", t)
-        values = np.full((*t.shape, self.system.d), np.nan)
-        for spline in self.curves:
-            low, high = spline.t[0], spline.t[-1]
-            slack = 1e-9 * (high - low)
-            inside = (t >= low - slack) & (t <= high + slack)
-            values[inside] = spline(np.clip(t[inside], low, high))
-        return values
+        return of_pieces(self.curves, check_array("t", t))
 
     def predict(self, x: Floats) -> Floats:
         """Time derivative at states, shape (n, d) or (d,), in units of the data.

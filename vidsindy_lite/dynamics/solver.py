@@ -148,11 +148,8 @@ def discover(
     times = [np.asarray(pair[0]) for pair in (t if x is None else [(t, x)])]
     shared = check_systematic(systematic, times, trajectories)
     measured = trajectories, shared, check_sigma(sigma, times, trajectories)
-    end = (
-        np.inf
-        if time_limit is None
-        else time.perf_counter() + check_positive("time_limit", time_limit)
-    )
+    limit = np.inf if time_limit is None else check_positive("time_limit", time_limit)
+    end = time.perf_counter() + limit
     task = _Task(measured, names, library, origin, seed, progress, end)
     # Matrices this small gain nothing by threads, which wait for each other on a busy machine.
     with one_blas_thread():
@@ -320,14 +317,12 @@ def accelerated(curves: Sequence[BSpline]) -> bool:
     of 40 %, outside the library up to .002; throws .02. Of the accelerations' squares clean flows
     leave .26 to .64 to no linear law, springs and throws up to .06.
     """
-    places, slopes, bends = [], [], []
-    for curve in curves:
-        low, high = curve.t[DEGREE + 1], curve.t[-DEGREE - 2]  # the outermost spans bend by chance
-        t = np.arange(low, high, 1 / 10)
-        places.append(curve(t))
-        slopes.append(curve(t, 1))
-        bends.append(curve(t, 2))
-    x, v, a = (np.concatenate(parts) for parts in (places, slopes, bends))
+    # The outermost spans bend by chance.
+    times = [np.arange(curve.t[DEGREE + 1], curve.t[-DEGREE - 2], 1 / 10) for curve in curves]
+    x, v, a = (
+        np.concatenate([curve(t, order) for curve, t in zip(curves, times, strict=True)])
+        for order in range(3)
+    )
     linear = np.hstack([np.ones((len(x), 1)), x, v])
     cubic = monomials(x, monomial_exponents(x.shape[1], 3))
     several = unexplained(cubic, v)
