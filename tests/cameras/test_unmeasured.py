@@ -179,6 +179,20 @@ def test_noise_makes_no_pinholes_of_parallel_views_and_no_fractions_of_whole_lag
     np.testing.assert_allclose(seen.lags.frames, lags, atol=0.2)
 
 
+def test_lags_that_others_fit_as_well_are_doubted():
+    rng = np.random.default_rng([77, 12, 2])
+    rig = of_lenses(room(rng), 12)
+    tracks = [
+        track + 1.5 * rng.normal(size=track.shape) for track in shot(rng, rig, FRAMES, (0, 5, -3))
+    ]
+    doubt = "the lags of the videos cannot be told: "
+    assert any(
+        text.startswith(doubt) for text in observe_tracks(tracks, blind(rig), FRAMES / FPS).warnings
+    )
+    told = factorised(Footage.of(far_away(4)[0]), far_away(4)[1])
+    assert told.lags.warnings == ()
+
+
 def test_views_of_different_things_do_not_agree():
     tracks, rig = far_away(count=120)
     rng = np.random.default_rng(1)

@@ -44,7 +44,7 @@ from ..arrays import Floats, Ints
 from ..progress import bar
 from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, known_to, persistence
 from .calibrate import check_learnable, closed_form
-from .clocks import INSTANTS, OVERLAP, Footage, Lags, check_lags, dips, list_lags
+from .clocks import INSTANTS, OVERLAP, Footage, Lags, check_lags, dips, list_lags, untold_lags
 from .models import TRIMMED, Camera, at_once, epipolar_lines, epipolar_rows, missed, trimmed
 from .rig import ALIKE, BETTER, DISAGREEMENT, FINE, GROSS, Rig, check_seen
 from .unmeasured import posed
@@ -318,12 +318,8 @@ def _learned(videos: _Videos) -> Lags:
     best = min(alike, key=lambda f: (not near(f, first), _moved(f)))
     told = _told(videos, drifted(best))
     if len(alike) > 1 and not near(best, first):
-        choices = [best, *(f for f in alike if f is not best)][:_SHOWN]
-        lags = " or ".join(f"({list_lags(f.footage.lags)})" for f in choices)
-        warning = (
-            f"the lags of the videos cannot be told: {lags} frames fit about equally well, because "
-            "the motion repeats itself; give the lags if you know them"
-        )
+        choices = [best, *(f for f in alike if f is not best)]
+        warning = untold_lags([f.footage.lags for f in choices], _SHOWN)
         told = replace(told, warnings=(warning, *told.warnings))
     return told
 

@@ -39,7 +39,7 @@ from scipy.optimize import least_squares
 
 from ..arrays import Floats
 from .adjust import PARTS, Adjustment, adjust, known_to, long_run_covariance
-from .clocks import OVERLAP, Footage, Lags, dips
+from .clocks import OVERLAP, Footage, Lags, dips, untold_lags
 from .models import AffineCamera, PerspectiveCamera, at_once, missed
 from .rig import ALIKE, BETTER, FINE, GROSS, Rig, check_views
 
@@ -61,9 +61,7 @@ _NOTE = (
 )
 
 
-def posed(
-    tracks: Sequence[Floats], rig: Rig, synchronous: bool = True, most: float = GROSS
-) -> Rig:
+def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True, most: float = GROSS) -> Rig:
     """The rig with places and directions found from tracks, if it has none.
 
     Parameters
@@ -300,7 +298,7 @@ def factorised(films: Footage, rig: Rig, synchronous: bool = False) -> Factorise
     found = [_best(some, rank, synchronous) for rank in ranks]
     enough = max(BETTER * found[-1][0], FINE)
     rank = next(rank for rank, (left, *_) in zip(ranks, found, strict=True) if left <= enough)
-    least, best, errors = found[rank - 1]
+    least, best, errors, others = found[rank - 1]
     if not np.isfinite(least):
         return None
     images = _images(films, best, range(count))
@@ -315,10 +313,14 @@ def factorised(films: Footage, rig: Rig, synchronous: bool = False) -> Factorise
     downs = np.split(np.sqrt(count) * axes[:3].T, count)
     places, sizes = np.split(middle, count), [camera.image_size for camera in rig.cameras]
     cameras = tuple(map(AffineCamera.of, downs, places, sizes))
-    doubts = () if left <= GROSS else (
-        f"views agree on one motion but for {left:.2g} pixels of noise: look at the tracks",
-    )  # fmt: skip
-    told = Lags(best, films.rates, errors, left, doubts, clocks=films.uneven)
+    doubts = []
+    if left > GROSS:
+        doubts.append(
+            f"views agree on one motion but for {left:.2g} pixels of noise: look at the tracks"
+        )
+    if others and rank > 1:  # on a line the motion is the same, whole periods apart
+        doubts.append(untold_lags([best, *others]))
+    told = Lags(best, films.rates, errors, left, tuple(doubts), clocks=films.uneven)
     return Factorised(Rig(cameras, note=_NOTE), told, rank)
 
 
@@ -337,17 +339,19 @@ def _left(footage: Footage, lags: Floats, places: Sequence[int], rank: int) -> f
     return float(np.sqrt(np.nansum(beyond**2) / (count * (width - rank))))
 
 
-def _best(footage: Footage, rank: int, synchronous: bool) -> tuple[float, Floats, Floats]:
+def _best(
+    footage: Footage, rank: int, synchronous: bool
+) -> tuple[float, Floats, Floats, list[Floats]]:
     """What the lags leave beyond a rank that leave least, those lags, and their errors.
 
-    Unless they are known.
+    Unless they are known. And others, more than a frame apart, that leave hardly more.
     Of two views, lags are promising that leave less than their neighbours; of three, these are
     tried together, and further views one by one. Of those that leave about as little, the
     shortest count.
     """
-    count, lags = len(footage.curves), np.zeros(1)
+    count, lags, others = len(footage.curves), np.zeros(1), list[Floats]()
     if synchronous:
-        return _left(footage, footage.lags, range(count), rank), footage.lags, np.zeros(count)
+        return _left(footage, footage.lags, range(count), rank), footage.lags, np.zeros(count), []
     promising = [_promising(footage, i, rank)[:_PROMISING] or [0.0] for i in range(1, count)]
     for further in (product(*promising[:2]), *map(product, promising[2:])):
         every = [(*lags, *new) for new in further]
@@ -358,7 +362,9 @@ def _best(footage: Footage, rank: int, synchronous: bool) -> tuple[float, Floats
         alike = np.flatnonzero(left <= max(ALIKE * left.min(), FINE))
         shortest = min(alike, key=lambda k: np.abs(found[k][0]).sum())
         (lags, errors), least = found[shortest], float(left[shortest])
-    return least, lags, errors
+        close = np.flatnonzero(left <= max(BETTER * least, FINE))
+        others = [found[k][0] for k in close if np.abs(found[k][0] - lags).max() > 1]
+    return least, lags, errors, others
 
 
 def _promising(footage: Footage, i: int, rank: int) -> list[float]:
