@@ -189,7 +189,8 @@ def _found(options: argparse.Namespace, rig: Any, kind: str, asked: dict[str, An
         if asked.get("hint") is not None:
             frame, *box = check_vector("hint", options.hint, 5).tolist()
             asked["hint"] = Hint(frame=frame if frame % 1 else int(frame), box=tuple(box))
-        return discover_from_video((options.tracks or options.videos)[0], **asked)
+        (path,) = options.tracks or options.videos
+        return discover_from_video(path, **asked)
     fps, t = asked.pop("fps"), None
     if fps is not None:
         t = frame_clock(options.videos[0]) / check_positive("fps", fps)

@@ -272,9 +272,10 @@ def _observed(
                 affine = _concluded(raw, tracks, far.rig, far.lags, clock, [], warnings, far.moving)
                 if far.moving < 3:  # what parallel projections see of a plane tells of no lens
                     return affine
-                most = max(cameras.BETTER * far.lags.residual, cameras.DISAGREEMENT / 2)
+                least = max(cameras.BETTER * far.lags.residual, cameras.DISAGREEMENT / 2)
+                most = min(least, cameras.GROSS)
             try:
-                rig = cameras.posed(films.aligned, rig, lags is not None, min(most, cameras.GROSS))
+                rig = cameras.posed(films.aligned, rig, lags is not None, most)
             except ValueError:
                 if affine is None:
                     raise

@@ -16,7 +16,7 @@ import numpy as np
 
 from .arrays import Floats
 from .cameras import Lags, OrthographicCamera, Rig
-from .checks import check_array, check_number, check_positive, check_vector, shown
+from .checks import check_array, check_number, check_path, check_positive, check_vector, shown
 from .dynamics import Discovery, Round, Swing, discover, homogeneous, on_circle, smooth
 from .pipeline import VideoDiscovery, check_found, law_options, refusing, times_of, tracked
 from .vision import Hint, check_detector, frame_clock, read_tracks, video_info
@@ -170,8 +170,10 @@ def discover_from_video(
         raise ValueError(
             f"length_error: must be a share of the length, from 0 to below 1, got {share}"
         )
-    name, table = Path(path).name, Path(path).suffix.lower() in TABLES
-    if individual is not None if not table else (hint is not None or detector != "auto"):
+    path = check_path("path", path)
+    name, table = path.name, path.suffix.lower() in TABLES
+    of_film, of_table = hint is not None or detector != "auto", individual is not None
+    if of_film if table else of_table:
         raise ValueError(
             "individual: must be given with a text file of tracks alone, hint and detector with a "
             f"film, got {name}"
@@ -218,23 +220,23 @@ Seen = tuple[Floats, Floats, int, Sequence[str]]
 
 
 def _film(
-    path: str | os.PathLike, fps: float | None, hint: Hint | None, detector: str | os.PathLike
+    path: Path, fps: float | None, hint: Hint | None, detector: str | os.PathLike
 ) -> tuple[tuple[int, int], Callable[[], Seen]]:
     """The size of a film's pictures, and what tracks the target in it."""
     shot = video_info(path)
     if fps is None and not shot.fps:
-        raise ValueError(f"fps: must be given, as {Path(path).name} states no frame rate")
+        raise ValueError(f"fps: must be given, as {path.name} states no frame rate")
     rate = shot.fps if fps is None else check_positive("fps", fps)
 
     def look() -> Seen:
-        (seen,) = tracked(Path(path), shot.frames, detector, hint)
+        (seen,) = tracked(path, shot.frames, detector, hint)
         return frame_clock(path) / rate, seen.pixels, 0, seen.warnings
 
     return shot.size, look
 
 
 def _table(
-    path: str | os.PathLike, fps: float | None, individual: str | None
+    path: Path, fps: float | None, individual: str | None
 ) -> tuple[tuple[int, int], Callable[[], Seen]]:
     """The size of the smallest picture that holds a track in a text file, and what gives it."""
     read = read_tracks(path, individual)

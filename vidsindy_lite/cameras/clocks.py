@@ -118,9 +118,9 @@ def list_lags(lags: Sequence[float] | Floats) -> str:
     return ", ".join(f"{round(lag, 2) + 0.0:g}" for lag in lags)
 
 
-def untold_lags(choices: Sequence[Floats], most: int = 3) -> str:
-    """What to say where several choices of lags fit, of which so many are named."""
-    lags = " or ".join(f"({list_lags(lags)})" for lags in choices[:most])
+def untold_lags(choices: Sequence[Floats]) -> str:
+    """What to say where several choices of lags fit; the first three are named."""
+    lags = " or ".join(f"({list_lags(lags)})" for lags in choices[:3])
     return (
         f"the lags of the videos cannot be told: {lags} frames fit about equally well, because "
         "the motion repeats itself; give the lags if you know them"

@@ -319,7 +319,7 @@ def _learned(videos: _Videos) -> Lags:
     told = _told(videos, drifted(best))
     if len(alike) > 1 and not near(best, first):
         choices = [best, *(f for f in alike if f is not best)]
-        warning = untold_lags([f.footage.lags for f in choices], _SHOWN)
+        warning = untold_lags([f.footage.lags for f in choices])
         told = replace(told, warnings=(warning, *told.warnings))
     return told
 
