@@ -68,6 +68,8 @@ def test_a_throw_is_a_constant_force(seed):
     assert found.status == "ok"
     assert "same everywhere" in found.note
     np.testing.assert_allclose(found.curve(t)[:, :2], x, atol=1e-3)
+    x[[0, -1]] = x[[1, -2]]  # in a hand, and on the ground
+    assert "in a hand" in homogeneous(t, noisy(x, seed), ("x", "y")).warnings[-1]
 
 
 def test_drag_is_given_where_it_is_plain_and_else_a_doubt_and_in_the_error_of_g():

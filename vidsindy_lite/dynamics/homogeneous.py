@@ -23,6 +23,7 @@ from .bspline import smooth
 from .data import inflation
 from .library import monomial_exponents, velocity_names
 from .model import PolynomialSystem
+from .noise import GROSS
 from .problem import FALSE_ALARM
 from .result import Discovery, Plateau
 
@@ -160,7 +161,8 @@ def homogeneous(
         )
         for j in range(found.system.d)
     )
-    return replace(found, warnings=_doubt(flight, richer, penalty), path=path)
+    doubts = *_doubt(flight, richer, penalty), *_strangers(t, x)
+    return replace(found, warnings=doubts, path=path)
 
 
 def _doubt(flight: Flight, richer: Flight, penalty: float) -> tuple[str, ...]:
@@ -177,6 +179,28 @@ def _doubt(flight: Flight, richer: Flight, penalty: float) -> tuple[str, ...]:
         f"time, beside a pull of {pull:.4g}, would leave {100 * left:.0f} % of the errors "
         f"({cause}, or the lens bends the picture); the law that is the same at every place and "
         "holds over the widest range of errors is given, its error bars hold the other",
+    )
+
+
+def _strangers(t: Floats, x: Floats) -> tuple[str, ...]:
+    """Places that are no part of the flight, with drag, which all but the two ends tell.
+
+    A tenth of the places on either side is foretold from those between: a hand or the ground may
+    have had the target there, and few such places bend the whole flight.
+    """
+    since, out = t - t.mean(), max(1, len(t) // 10)
+    inner = Flight.fitted(since[out:-out], x[out:-out], np.ones(3 * x.shape[1] + 1, dtype=bool))
+    sizes, axes = np.linalg.eigh(inner.covariance)
+    told, moves = places(since, inner.theta), np.sqrt(np.maximum(sizes, 0.0)) * axes
+    unsure = [places(since, inner.theta + one) - told for one in moves.T]
+    spread = np.sqrt(inner.error**2 + np.square(unsure).sum(axis=0))
+    strange = t[(np.abs(x - told) > GROSS * spread).any(axis=1)]
+    if not len(strange):
+        return ()
+    return (
+        f"{len(strange)} of {len(t)} places, the first at t = {strange[0]:.4g} and the last at "
+        f"{strange[-1]:.4g}, are no part of the flight that the others tell (the target may be in "
+        "a hand there, or on the ground): leave them out",
     )
 
 
