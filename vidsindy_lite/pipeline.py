@@ -768,12 +768,17 @@ def _with_law(seen: Observation, names: Sequence[str], law: dict[str, Any]) -> V
     default = all(law[name] in (None, "auto") for name in ("degree", "library", "order"))
     if default and isinstance(seen.rig.cameras[0], cameras.AffineCamera):
         law |= {"degree": 1, "order": 2}
-    moves = np.nanmin(seen.x, axis=0) < np.nanmax(seen.x, axis=0)  # in a plane or on a line
+    reach = np.nanmax(seen.x, axis=0) - np.nanmin(seen.x, axis=0)
+    moves = reach > 1e-9 * reach.max()  # but for rounding; others are at rest
     with refusing("law", seen.tracks, names):
         if not moves.any():
             raise ValueError("tracks: must show a target that moves, got one that stands still")
         x, modes = seen.x[:, moves], seen.systematic[..., moves]
         found = dynamics.discover(seen.t, x, systematic=modes, **law)
+    axes = np.eye(len(moves))[moves]
+    if not moves[: len(axes)].all():  # else they are the first, as a law's are
+        turn = axes if found.orientation is None else found.orientation @ axes
+        found = replace(found, orientation=turn)
     # Who keeps the law alone keeps the doubts about what it was found in.
     found = replace(found, warnings=(*seen.warnings, *found.warnings))
     return VideoDiscovery(**vars(seen) | {"warnings": found.warnings}, discovery=found)

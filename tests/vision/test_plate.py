@@ -4,13 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.plate import (
-    Plate,
-    least_difference,
-    lights_of,
-    noise_of,
-    tolerance,
-)
+from vidsindy_lite.vision.plate import Plate, least_difference, lights_of, noise_of, tolerance
 
 SIZE = (128, 96)
 
