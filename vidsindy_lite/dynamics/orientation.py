@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 from scipy.linalg import block_diag, eigh
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
-from scipy.stats import special_ortho_group
 
 from ..arrays import Floats, Ints
 from ..checks import check_choice
@@ -111,7 +110,9 @@ def rough_orientations(problem: Problem, rng: np.random.Generator, most: int = 3
             continue
         law = TurnedLaw.of(problem, fit)
         law = replace(law, estimates=law.estimates[:41])
-        starts = [*found, np.eye(m), *special_ortho_group.rvs(m, 20, rng)]
+        turns, _ = np.linalg.qr(rng.standard_normal((20, m, m)))
+        turns[:, 0] *= np.linalg.det(turns)[:, None]  # not mirrored
+        starts = [*found, np.eye(m), *turns]
         # A coefficient counts from a tenth of its standard size on, at the end from a hundredth.
         coarse = [law.descended(turn, np.zeros(m), 0.1) for turn in starts]
         coarse.sort(key=itemgetter(0))
