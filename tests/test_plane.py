@@ -202,6 +202,15 @@ def test_a_spring_on_a_line_has_a_period(monkeypatch):
     assert abs(said["damping"].value - 2 * 0.1) < 3 * said["damping"].error < 0.03
 
 
+def test_what_a_slope_bears_has_no_g(monkeypatch):
+    rolled = 1.5 * np.outer(np.arange(30) / 30, (1, 1)) ** 2 @ [[0.8, 0], [0, -0.6]]
+    filmed(monkeypatch, pixels_of(noisy(rolled, 0)))
+    found = vl.discover_from_video("slope.mp4", STICK)
+    assert found.status == "ok"
+    assert found.g is None
+    assert "53 degrees off the vertical: something bears it" in found.rig.note
+
+
 def test_a_swing_is_on_a_circle(monkeypatch):
     x = swung(np.arange(90) / 30, 0.5, 0.1) + [0, 0.46]
     filmed(monkeypatch, pixels_of(noisy(x, 0)))

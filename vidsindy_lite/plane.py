@@ -17,7 +17,7 @@ import numpy as np
 from .arrays import Floats
 from .cameras import Lags, OrthographicCamera, Rig
 from .checks import check_array, check_number, check_path, check_positive, check_vector, shown
-from .dynamics import Discovery, Round, Swing, discover, homogeneous, on_circle, smooth
+from .dynamics import Discovery, Quantity, Round, Swing, discover, homogeneous, on_circle, smooth
 from .pipeline import VideoDiscovery, check_found, law_options, refusing, times_of, tracked
 from .vision import Hint, check_detector, frame_clock, read_tracks, video_info
 
@@ -80,6 +80,22 @@ class PlaneDiscovery(VideoDiscovery):
     def swing(self) -> Swing | None:
         """The circle and the law of the angle on it, if the target swings on one."""
         return None if self.circle is None else Swing(self.circle, self.discovery)
+
+    @property
+    def leaning(self) -> float:
+        """By how many degrees a motion along a line leans from the vertical; else 0.
+
+        And where that may be how the telephone was held.
+        """
+        there = np.isfinite(self.x[:, 0])
+        axes = _axes(self.t[there], self.x[there, :2])
+        off = float(np.arctan2(*np.abs(axes[0])))
+        return float(np.rad2deg(off)) if len(axes) == 1 and off > SURE * HELD else 0.0
+
+    @property
+    def g(self) -> Quantity | None:
+        """As of any motion; None of what leans, since a slope or a table bears it."""
+        return None if self.leaning else super().g
 
     @property
     def fitted(self) -> Floats:
@@ -206,6 +222,11 @@ def discover_from_video(
         t=t, x=_in_space(x), systematic=np.pad(modes, ((0, 0), (0, 0), (0, 1))),
         warnings=(), discovery=law, unit=unit, circle=circle,
     )  # fmt: skip
+    if found.leaning:
+        borne = (
+            f"{found.leaning:.0f} degrees off the vertical: something bears it, its pull is no g"
+        )
+        found = replace(found, rig=replace(rig, note=f"{rig.note}; along a line {borne}"))
     contradicted = _contradicted(found, up is not None or corners is not None, corners is None)
     if doubts and frames is None:
         contradicted.append(
