@@ -54,17 +54,14 @@ def test_springs_that_stand_askew_are_found_along_themselves():
 
 # ------------------------------------------------------------------------------- errors of the axes
 
-LORENZ = {
-    "x": {"x": -10, "y": 10},
-    "y": {"x": 28, "x z": -1, "y": -1},
-    "z": {"x y": 1, "z": -8 / 3},
-}
-FULL = {"x": {"x": -0.1, "y": 1}, "y": {"x": -1.5, "y": 0.05}}  # has all terms in all axes
+LORENZ = SYSTEMS["Lorenz"]
+# It has all terms in all axes.
+FULL = vl.PolynomialSystem.from_terms({"x": {"x": -0.1, "y": 1}, "y": {"x": -1.5, "y": 0.05}})
 
 
-def sampled(terms, degree, start):
+def sampled(law, degree, start):
     """Noisy samples of a law in its own axes."""
-    law, t = vl.PolynomialSystem.from_terms(terms), np.linspace(0, 20 / degree, 300)
+    t = np.linspace(0, 20 / degree, 300)
     x = law.simulate(t, start)
     return t, x + 0.01 * x.std() * np.random.default_rng(0).normal(size=x.shape)
 
@@ -75,19 +72,19 @@ def own_errors(fit, model):
 
 
 @pytest.mark.parametrize(
-    ("terms", "degree", "start", "live"),
+    ("law", "degree", "start", "live"),
     [(LORENZ, 2, [-8.0, 7.0, 27.0], 7), (FULL, 1, [1.5, 0.4], 4)],
 )
 def test_axes_that_are_not_known_make_errors_larger_unless_terms_leave_them_open(
-    terms, degree, start, live
+    law, degree, start, live
 ):
     """Those that are left open are a choice, and no error."""
-    found, problem, fit = solved(*sampled(terms, degree, start), degree)
+    found, problem, fit = solved(*sampled(law, degree, start), degree)
     assert found.native.support.sum() == live
     known, learned = own_errors(fit, problem.model(fit)), own_errors(fit, with_turns(problem, fit))
     assert (learned > known * (1 - 1e-6)).all()
-    assert (learned > 1.1 * known).any() == (terms is LORENZ)
-    assert terms is LORENZ or learned == pytest.approx(known, rel=1e-6)
+    assert (learned > 1.1 * known).any() == (law is LORENZ)
+    assert law is LORENZ or learned == pytest.approx(known, rel=1e-6)
 
 
 def test_where_no_axes_are_better_those_of_the_data_stay():
@@ -100,17 +97,15 @@ def test_where_no_axes_are_better_those_of_the_data_stay():
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("options", "width", "message"),
     [
-        ({"orientation": "mine"}, "orientation: must be one of data, learn, got 'mine'"),
-        ({"library": vl.Library.fourier(1)}, "orientation: can be learned only among all"),
-        ({"origin": "data"}, "orientation: can be learned only with origin='learn', got 'data'"),
-        ({"width": 4}, "orientation: can be learned of two or three coordinates, got 4"),
+        ({"orientation": "mine"}, 2, "orientation: must be one of data, learn, got 'mine'"),
+        ({"library": vl.Library.fourier(1)}, 2, "orientation: can be learned only among all"),
+        ({"origin": "data"}, 2, "orientation: can be learned only with origin='learn', got 'data'"),
+        ({}, 4, "orientation: can be learned of two or three coordinates, got 4"),
     ],
 )
-def test_what_has_no_orientation_is_refused(options, message):
-    options = dict(options)
-    width = options.pop("width", 2)
+def test_what_has_no_orientation_is_refused(options, width, message):
     x = np.random.default_rng(0).normal(size=(200, width))
     with pytest.raises(ValueError, match=message):
         vl.discover(np.arange(200.0), x, **({"orientation": "learn"} | options))
