@@ -83,6 +83,7 @@ apidoc_modules = [{
     "path": ROOT / "vidsindy_lite", "destination": "build/api", "module_first": True,
     "separate_modules": True, "exclude_patterns": ["**/__main__.py"],
 }]  # fmt: skip
+autodoc_typehints = "none"  # each argument says its own
 default_role = "py:obj"
 napoleon_use_param = False  # or "shape" in the type of an argument links to `Scene.shape`
 suppress_warnings = ["ref.python"]  # one name, several places
