@@ -22,6 +22,7 @@ from ..arrays import Bools, Floats, Ints
 from .bspline import smooth
 from .data import inflation
 from .library import monomial_exponents, velocity_names
+from .mechanics import Quantity
 from .model import PolynomialSystem
 from .noise import GROSS
 from .problem import FALSE_ALARM
@@ -213,9 +214,11 @@ def _told(law: Flight, covariance: Floats, t: Floats, names: tuple[str, ...]) ->
     rates = [(coefficients_of(one, exponents) - still).T.ravel() for one in np.eye(len(law.theta))]
     spread = np.transpose(rates) @ covariance @ rates
     shown = np.linspace(t[0], t[-1], 201)  # enough for a smooth curve
-    since = shown - (t[0] + t[-1]) / 2
+    m, middle = len(names), (t[0] + t[-1]) / 2
+    moves, since = slice(m, 2 * m), shown - middle
+    speed = Quantity.of(f"velocity at t = {middle:.4g}", law.theta[moves], covariance[moves, moves])
     states = np.hstack([places(since, law.theta, slope) for slope in (False, True)])
-    noise = np.append(np.sqrt((law.left**2).mean(axis=0)), np.full(len(names), np.nan))
+    noise = np.append(np.sqrt((law.left**2).mean(axis=0)), np.full(m, np.nan))
     nothing = np.zeros(system.d)
     return Discovery(
         system=system, native=system, offset=nothing, covariance=spread, native_covariance=spread,
@@ -223,5 +226,5 @@ def _told(law: Flight, covariance: Floats, t: Floats, names: tuple[str, ...]) ->
         curves=(make_interp_spline(shown, states, k=3),),
         absent=np.full((*coefficients.shape, 2), np.nan),
         note="order 2: of laws that one flight cannot tell apart, the one that is the same "
-        "everywhere",
+        f"everywhere; {speed}",
     )  # fmt: skip
