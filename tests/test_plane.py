@@ -225,6 +225,21 @@ def test_a_swing_is_on_a_circle(monkeypatch):
     np.testing.assert_allclose(found.fitted, found.x, atol=2e-3)
 
 
+def test_a_wheel_turns_by_the_law_of_its_angle(monkeypatch):
+    t = np.arange(120) / 30
+    for term, angle in {
+        "1": 6 * t - 0.6 * t**2,
+        "vangle": -20 * np.exp(-0.3 * t),
+        "": 6 * t,
+    }.items():
+        turned = 0.4 * np.column_stack([np.cos(angle), np.sin(angle)])
+        filmed(monkeypatch, pixels_of(noisy(turned, 0)))
+        found = vl.discover_from_video("wheel.mp4", STICK)
+        law = found.discovery
+        told = [law.terms[row] for row in np.flatnonzero(law.system.support[:, 1])]
+        assert (found.status, found.g, "".join(told)) == ("ok", None, term)
+
+
 def test_a_wrong_length_and_a_wrong_vertical_are_told(monkeypatch):
     filmed(monkeypatch, pixels_of(noisy(flight()[1], 0)))
     found = vl.discover_from_video("throw.mp4", (*STICK[:4], 0.7), up=(0.3, -1))

@@ -400,7 +400,9 @@ def _law(
         asked, axes = asked | {"degree": 1, "order": 2}, _axes(t[there], x[there])
     law = discover(t, x @ axes.T, systematic=modes[:1] @ axes.T, **asked)
     if law.swing is not None:
-        return law.swing.law, on_circle(x, law.swing.circle.axes[0], modes)
+        circle = on_circle(x, law.swing.circle.axes[0], modes)
+        angle, shared = circle.angle[there, None], np.asarray(circle.systematic)[:, there]
+        return homogeneous(t[there], angle, ("angle",), shared) or law.swing.law, circle
     if len(axes) == 1:
         law = replace(law, orientation=np.pad(axes, ((0, 0), (0, 1))))
     return law, None
@@ -419,7 +421,7 @@ def _contradicted(found: PlaneDiscovery, vertical: bool, askew: bool) -> list[st
     """What the law says against scale, frame rate and vertical, and a plane that may lie askew."""
     doubts, g = [], found.g
     drags = [str(one) for one in found.discovery.physics() if one.name.startswith("drag")]
-    if drags and askew:
+    if drags and askew and found.circle is None:
         doubts.append(
             f"corners: {', '.join(drags)} is that of a path that recedes as well, as in a plane "
             "that lies askew: give four marks of a rectangle in the plane"

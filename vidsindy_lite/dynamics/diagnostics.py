@@ -99,10 +99,10 @@ def _moving(x: Floats, noise: Floats) -> Bools:
     return np.array([_distance(centred[:, [j]], e)[1] / e > 0.5 for j, e in enumerate(noise)])
 
 
-def is_on_circle(x: Floats, noise: Floats, fewest: int = 5) -> bool:
+def is_on_circle(x: Floats, noise: Floats, places: bool, fewest: int = 5) -> bool:
     """Whether positions, (n, d), are bound to a circle, if their errors, (d,), are so large.
 
-    The fewest are always on one, or nearly.
+    The fewest are always on one, or nearly. Two coordinates may not be ``places``.
     """
     if x.shape[1] not in (2, 3) or len(x) <= fewest:
         return False
@@ -110,7 +110,7 @@ def is_on_circle(x: Floats, noise: Floats, fewest: int = 5) -> bool:
     if moves.sum() < 2:
         return False
     x, noise = x[:, moves], noise[moves]
-    where = _round(x, noise, _across(x, noise)[1])
+    where = _round(x, noise, _across(x, noise)[1], places)
     return where is not None and where.shape == "circle"
 
 
@@ -138,12 +138,12 @@ def _relation(normal: Floats, x: Floats, names: Sequence[str]) -> str:
     return f"{sides} = {0 if nil else constant:.4g}"
 
 
-def _round(x: Floats, noise: Floats, flat: int) -> Round | None:
+def _round(x: Floats, noise: Floats, flat: int, places: bool = False) -> Round | None:
     """The circle or sphere of a motion that is flat across so many directions, if it is on one.
 
     Of two coordinates that go round, one may be the speed of the other, or hunt it: only what turns
     back on its arc, as nothing does that is not bound to it, is a bob; it may be ten times as far
-    off. In space, half a turn is enough.
+    off. Of what are ``places`` for sure, as in space, half a turn is enough.
     """
     d = x.shape[1]
     planar = d - flat == 2
@@ -166,7 +166,7 @@ def _round(x: Floats, noise: Floats, flat: int) -> Round | None:
     pieces = [piece.mean() for piece in np.array_split(where.angle, min(50, len(x)))]
     length = float(np.ptp(pieces))
     back = np.abs(np.diff(pieces)).sum() > 1.5 * length
-    bound = back or (d > 2 and length > np.pi)
+    bound = back or (d > 2 or places) and length > np.pi
     return where if bound and _on(off, error, widths[-2], 10 * CLOSE if back else CLOSE) else None
 
 

@@ -33,6 +33,9 @@ POINTS = 1001
 IMITATED = "if its powers imitate no other force, as cubics do a sine"
 """When numbers of small swings, of which a law with powers was fitted to large ones, are right."""
 
+NAME = "angle"
+"""Of the coordinate of what moves on a circle."""
+
 Complexes = NDArray[np.complex128]
 
 
@@ -257,11 +260,11 @@ class _Body:
                 said["quadratic drag"][j] -= law.coefficients[row, self.m + j]
             return {"g": np.array(g), "direction": pull / max(abs(g), LEAST)} | said
 
-        said = self.carried(rule)
+        said, turns = self.carried(rule), self.law.names[0] == NAME
         if not pull.any():
             yield "no constant force: no g"
         else:
-            yield Quantity.of("g", *said["g"])
+            yield Quantity.of("constant torque" if turns else "g", *said["g"])
             if down is None:
                 yield Quantity.of("direction", *said["direction"])
         if not _diagonal(slowed):

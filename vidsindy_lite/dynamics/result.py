@@ -25,7 +25,7 @@ from .bspline import smooth
 from .collocation import Fit, WithCurve
 from .data import Trajectory
 from .library import Function, Library, extended, of_pieces
-from .mechanics import Physics, Quantity, Round, on_circle, physics_of
+from .mechanics import NAME, Physics, Quantity, Round, on_circle, physics_of
 from .model import PolynomialSystem, place, with_error
 from .problem import Problem
 
@@ -559,7 +559,6 @@ def unseen(
 LIBRARY = (Library.polynomial(1) + Library.fourier(1)).where({"vangle": {"angle": 0}})
 """What may pull at an angle and is the same after a full turn: a push, friction, and gravity in any
 direction."""
-NAME = "angle"
 
 
 @dataclass(frozen=True, eq=False)
@@ -584,10 +583,10 @@ class Swing:
         If all its mass is at that radius, and all axes have the same scale: along an arc, a scale
         that is off by one per cent makes two of the radius, and the data hardly tell.
         """
+        if f"sin({NAME})" not in self.law.system.text():
+            return None
         row, circle = self.law.terms.index(f"sin({NAME})"), self.circle
         pull, error = -self.law.coefficients[row, 1], self.law.standard_errors[row, 1]
-        if not pull:
-            return None
         error = np.hypot(circle.radius * error, pull * circle.radius_error)
         return Quantity("g", np.asarray(circle.radius * pull), np.asarray(error))
 

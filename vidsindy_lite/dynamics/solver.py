@@ -29,12 +29,13 @@ from .data import Trajectory, check_sigma, check_systematic, check_trajectories,
 from .diagnostics import diagnose, is_on_circle
 from .inference import infer, with_errors
 from .library import Library, check_library, monomial_exponents, monomials
+from .mechanics import NAME
 from .model import Form
 from .noise import rebalanced, smoother_weights, views, with_process_noise
 from .orientation import Measured, Solved, check_orientation, in_axes, in_sparsest_axes, with_turns
 from .path import ROUNDS, first_law, information_criterion, near, persistent
 from .problem import Problem, pose
-from .result import LIBRARY, NAME, Discovery, History, Path, Swing, swinging
+from .result import LIBRARY, Discovery, History, Path, Swing, swinging
 
 _lock = Lock()
 _at_work: list[threadpool_limits] = []  # one for each discovery, the first of which counts
@@ -201,7 +202,7 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     found, problem, _ = _solved(task, task.form(2 if order == 2 else 1))
     if order == 1 or task.library.given or not found.warnings:
         return found
-    swing = _swing(task, problem)
+    swing = _swing(task, problem, order == 2)
     drowned = problem.noise.max() > 0.5  # a curve shows no accelerations
     if swing or order == 2 or drowned:
         return replace(found, swing=swing)
@@ -215,7 +216,7 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     return better(found, second)
 
 
-def _swing(task: _Task, problem: Problem) -> Swing | None:
+def _swing(task: _Task, problem: Problem, places: bool) -> Swing | None:
     """The law of the angle of positions that are on a circle, if nothing but polynomials is given.
 
     None elsewhere, or if there is too little of it.
@@ -223,7 +224,8 @@ def _swing(task: _Task, problem: Problem) -> Swing | None:
     trajectories, shared, _ = task.measured
     x = np.concatenate([values for _, values in trajectories])
     noise = (problem.noise * problem.units.scale)[: x.shape[1]]
-    if problem.form.functions or not is_on_circle(x[np.isfinite(x).all(axis=1)], noise):
+    seen = x[np.isfinite(x).all(axis=1)]
+    if problem.form.functions or not is_on_circle(seen, noise, places):
         return None
 
     form = Form.of((NAME,), LIBRARY, 2)
