@@ -54,8 +54,6 @@ def test_a_notebook_holds_for_other_settings(number, settings, tmp_path, shared_
     assert run_quickly(NOTEBOOKS[number], tmp_path, settings, shared_cache) == ""
 
 
-# -------------------------------------------------------------------------------------- last digits
-
 HAIR = """\
 profile: str = "full"  # full or quick
 from vidsindy_lite.study import SYSTEMS

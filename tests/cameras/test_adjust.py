@@ -116,8 +116,6 @@ def test_how_well_a_camera_is_known():
     assert np.flatnonzero(np.isinf(flat)).tolist() == [4, 5]  # along its axis it sees the same
 
 
-# -------------------------------------------------------------------- errors that all samples share
-
 NOISE = 0.05  # pixels
 STILL = Lags(np.zeros(3), np.ones(3), np.zeros(3), 0.0)
 

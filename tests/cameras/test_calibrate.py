@@ -304,9 +304,6 @@ def test_what_eq_4_needs(small):
         learn_cameras_eq4(tracks, rig.uncalibrated())
 
 
-# ---------------------------------------------------------------------------------------- rig files
-
-
 @pytest.mark.parametrize("model", ["orthographic", "perspective"])
 @pytest.mark.parametrize(("cameras", "apart"), [(2, 120), (3, 120), (5, 72)])
 def test_a_template_is_a_rig_with_a_calibrated_camera_evenly_around(

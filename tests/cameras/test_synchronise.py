@@ -301,9 +301,6 @@ def test_noise_agrees_and_what_persists_does_not(motion, size, memory, told):
     assert agrees(fit) is told
 
 
-# ------------------------------------------------------------------------------------------- clocks
-
-
 def test_the_times_of_each_track_are_checked():
     tracks = [np.zeros((4, 2)), np.zeros((5, 2))]
     clock = Clock.of_tracks([[0, 1, 2, 4], [0, 0.5, 1.0, 1.5, 3]], tracks)

@@ -98,8 +98,6 @@ def test_pages_after_the_notebooks_are_those_of_now(name):
     assert pages(ROOT)[name] == (ROOT / name).read_text("utf-8")
 
 
-# ------------------------------ the page that goes through the paper: its verdicts are the data's
-
 PAGE = (ROOT / "docs" / "paper.md").read_text("utf-8")
 VERDICTS = {"same", "stronger", "weaker", "corrected", "open"}
 # What the paper numbers, as it is called in the first column.

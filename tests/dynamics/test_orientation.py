@@ -52,8 +52,6 @@ def test_springs_that_stand_askew_are_found_along_themselves():
     assert apart(found.orientation, axes) < np.deg2rad(1)
 
 
-# ------------------------------------------------------------------------------- errors of the axes
-
 LORENZ = SYSTEMS["Lorenz"]
 # It has all terms in all axes.
 FULL = vl.PolynomialSystem.from_terms({"x": {"x": -0.1, "y": 1}, "y": {"x": -1.5, "y": 0.05}})

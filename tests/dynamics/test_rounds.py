@@ -113,8 +113,6 @@ def test_what_is_on_no_circle_is_said_in_short():
     assert "may be on no sphere" in str(vl.on_sphere(rng.standard_normal((200, 3))))
 
 
-# ------------------------------------------------------------------------------------------- swings
-
 LENGTH, G, FRICTION = 1.2, 9.81, 0.1
 SINES = vl.Library.polynomial(1) + vl.Library.fourier(1)
 PENDULUM = vl.PolynomialSystem.from_terms(
