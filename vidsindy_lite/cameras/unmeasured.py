@@ -356,6 +356,7 @@ def _best(
     for further in (product(*promising[:2]), *map(product, promising[2:])):
         every = [(*lags, *new) for new in further]
         views = range(len(every[0]))
+        every.append(tuple(footage.lags[: len(views)]))
         tried = sorted((_left(footage, np.array(late), views, rank), late) for late in every)
         found = [_polished(footage, np.array(late), rank) for _, late in tried[:_LAGS]]
         left = np.array([_left(footage, late, views, rank) for late, _ in found])
