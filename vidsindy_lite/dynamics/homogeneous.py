@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import least_squares
-from scipy.special import chdtri, exprel
+from scipy.special import chdtri, exprel, fdtri
 
 from ..arrays import Bools, Floats, Ints
 from .bspline import smooth
@@ -25,7 +25,7 @@ from .library import monomial_exponents, velocity_names
 from .mechanics import Quantity
 from .model import PolynomialSystem
 from .noise import GROSS
-from .problem import FALSE_ALARM
+from .problem import FALSE_ALARM, SURE
 from .result import Discovery, Plateau
 
 
@@ -162,7 +162,7 @@ def homogeneous(
         )
         for j in range(found.system.d)
     )
-    doubts = *_doubt(flight, richer, penalty), *_strangers(t, x)
+    doubts = *(_doubt(flight, richer, penalty) or _bent(since, x, flight)), *_strangers(t, x)
     return replace(found, warnings=doubts, path=path)
 
 
@@ -180,6 +180,22 @@ def _doubt(flight: Flight, richer: Flight, penalty: float) -> tuple[str, ...]:
         f"time, beside a pull of {pull:.4g}, would leave {100 * left:.0f} % of the errors "
         f"({cause}, or the lens bends the picture); the law that is the same at every place and "
         "holds over the widest range of errors is given, its error bars hold the other",
+    )
+
+
+def _bent(t: Floats, x: Floats, flight: Flight) -> tuple[str, ...]:
+    """Whether the path bends as no such force makes it: by the third and fourth power of time."""
+    powers = np.vander(t / np.ptp(t), 5)
+    left = x - powers @ np.linalg.lstsq(powers, x, rcond=None)[0]
+    more, rest = 5 * x.shape[1] - int(flight.free.sum()), max(x.size - 5 * x.shape[1], 1)
+    square = (left**2).sum() / rest
+    gained = ((flight.left**2).sum() - (left**2).sum()) / more / inflation([flight.left]).max()
+    if gained < square * fdtri(more, rest, 1 - SURE):
+        return ()
+    share = 100 * np.sqrt(square) / flight.error
+    return (
+        f"the path bends as no force does that is the same everywhere: two powers of the time more "
+        f"would leave {share:.0f} % of the errors (the target may be held, or its errors smooth)",
     )
 
 
