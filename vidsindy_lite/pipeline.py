@@ -773,8 +773,11 @@ def _with_law(seen: Observation, names: Sequence[str], law: dict[str, Any]) -> V
     with refusing("law", seen.tracks, names):
         if not moves.any():
             raise ValueError("tracks: must show a target that moves, got one that stands still")
-        x, modes = seen.x[:, moves], seen.systematic[..., moves]
-        found = dynamics.discover(seen.t, x, systematic=modes, **law)
+        x, modes, found = seen.x[:, moves], seen.systematic[..., moves], None
+        if default and seen.targets == 1:
+            rows, axes = np.isfinite(x).all(axis=1), dynamics.variable_names(x.shape[1])
+            found = dynamics.homogeneous(seen.t[rows], x[rows], axes, modes[:, rows])
+        found = found or dynamics.discover(seen.t, x, systematic=modes, **law)
     axes = np.eye(len(moves))[moves]
     if not moves[: len(axes)].all():  # else they are the first, as a law's are
         turn = axes if found.orientation is None else found.orientation @ axes

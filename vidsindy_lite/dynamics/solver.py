@@ -209,11 +209,16 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     # With inputs a place is passed with several velocities, whatever the order is.
     if not (found.system.timed or accelerated(problem.curves)):
         return found
-    try:
-        second, *_ = _solved(task, task.form(2))
-    except ValueError:  # too few samples for a law of so many terms, or its names are taken
-        return found
-    return better(found, second)
+    whole, second = task.library.degree, None
+    for degree in [1, whole] if whole and whole > 1 else [whole]:  # linear forces come first
+        simple = replace(task, library=replace(task.library, degree=degree))
+        try:
+            second, *_ = _solved(simple, simple.form(2))
+        except ValueError:  # too few samples for a law of so many terms, or its names are taken
+            break
+        if not second.warnings:
+            break
+    return better(found, second) if second else found
 
 
 def _swing(task: _Task, problem: Problem, places: bool) -> Swing | None:
