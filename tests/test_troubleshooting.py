@@ -121,9 +121,9 @@ def oscillation(step, count, noise):
     return told(vl.discover, t, add_noise(x, noise, np.random.default_rng(0)), degree=1)
 
 
-def circling(coordinates):
+def circling(studio):
     t = np.linspace(0, 12, 400)
-    x = np.stack([np.cos(3 * t), np.sin(3 * t)], axis=1)[:, :coordinates]
+    x = np.stack([np.cos(3 * t), np.sin(3 * t)], axis=1)
     return told(vl.discover, t, x, order=2, degree=1)
 
 
@@ -228,8 +228,7 @@ TROUBLES = {
     "has other coefficients than the rest": unlike,
     "is settled by how large an error is tolerated": contested,
     "a sample lies far from those before and after it": jumping,
-    "repeats one closed orbit": lambda studio: circling(1),
-    "places and velocities depend on each other": lambda studio: circling(2),
+    "places and velocities depend on each other": circling,
     "turns of the motion": lambda studio: oscillation(0.01, 200, 0.05),
     "sample faster": lambda studio: oscillation(1.3, 200, 0.02),
     "from a drive or a force that nobody named": kicked,

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import PolynomialSystem, discover
 from vidsindy_lite.dynamics.diagnostics import cancelling, shapes, tied
-from vidsindy_lite.study import SYSTEMS
+from vidsindy_lite.study import SYSTEMS, score
 
 TIMES = np.linspace(0, 12, 600)
 
@@ -41,9 +41,6 @@ NAMED = {
     "bob": (bob(pendulum(1.0)[:, 0]), "on a circle"),
     "bob in its plane": (bob(pendulum(1.5, 0.1)[:, 0])[:, [0, 2]] / [0.6, 1], "on a circle"),
     "bob that swings aside": (spherical(), "on a sphere"),
-    "pendulum": (pendulum(1.0), "closed orbit"),
-    "pendulum, angle": (pendulum(1.0)[:, :1], "closed orbit"),
-    "ellipse": (np.stack([np.cos(2 * TIMES), 0.6 * np.sin(2 * TIMES)], 1), "closed orbit"),
     "line": (waves((1, 2), (0.6, 2)), "on a line"),
     "plane": (waves((1, 2), (0.6, 3.1)) @ [[1, 0, 0.5], [0, 1, -0.2]] + [0, 0, 4], "in a plane"),
     "sum": (waves((1, 2), (1, 3.1), (1, 1.3)) @ [[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1]], "3 of"),
@@ -51,11 +48,11 @@ NAMED = {
 }
 
 
-def told(x, share=0.01, t=TIMES, terms=2):
+def told(x, share=0.01):
     """What is said of positions with errors of a share of the widest coordinate."""
     noise = np.full(x.shape[1], share * x.std(axis=0).max())
     noisy = x + noise * np.random.default_rng(0).standard_normal(x.shape)
-    return " | ".join(shapes([(t, noisy)], noise, "xyzw"[: x.shape[1]], np.full(x.shape[1], terms)))
+    return " | ".join(shapes(noisy, noise, "xyzw"[: x.shape[1]]))
 
 
 @pytest.mark.parametrize("name", NAMED)
@@ -67,22 +64,21 @@ def test_a_shape_is_named(name):
 @pytest.mark.parametrize("share", [0.0, 0.2])
 @pytest.mark.parametrize("name", ["Lorenz", "SprottE"])
 def test_flows_are_on_no_shape(name, share):
-    t, x = SYSTEMS[name].trajectory(600)
-    x = x / x.std(axis=0)
-    assert told(x, max(share, 1e-5), t=t, terms=10) == ""
+    _, x = SYSTEMS[name].trajectory(600)
+    assert told(x / x.std(axis=0), max(share, 1e-5)) == ""
 
 
 def test_a_throw_is_in_a_plane_and_throws_are_not():
     t = np.linspace(0, 1.5, 90)
     runs = [
-        (t, np.stack([4 * np.cos(a) * t, 4 * np.sin(a) * t, 8 * t - 4.9 * t**2], axis=1))
+        np.stack([4 * np.cos(a) * t, 4 * np.sin(a) * t, 8 * t - 4.9 * t**2], axis=1)
         for a in (0.5, 2.5)
     ]
-    one, noise, terms = runs[:1], np.full(3, 1e-5), np.ones(3, dtype=int)
-    assert "in a plane (x - 1.83 y = 0)" in " ".join(shapes(one, noise, "xyz", terms))
-    assert list(shapes(runs, noise, "xyz", terms)) == []
+    noise = np.full(3, 1e-5)
+    assert "in a plane (x - 1.83 y = 0)" in " ".join(shapes(runs[0], noise, "xyz"))
+    assert list(shapes(np.concatenate(runs), noise, "xyz")) == []
     x = np.stack([np.cos(t), np.sin(t), np.cos(t)], axis=1)  # no factor of one
-    told = " ".join(shapes([(t, x)], np.full(3, 1e-6), "xyz", terms))
+    told = " ".join(shapes(x, np.full(3, 1e-6), "xyz"))
     assert "(x - z = 0)" in told or "(z - x = 0)" in told
 
 
@@ -93,13 +89,13 @@ def test_an_arc_that_is_passed_once_is_no_circle():
     assert "on a circle" in told(bob(2 * angle))  # more than half of it, in space
 
 
-def test_an_orbit_that_shrinks_or_is_rich_is_not_too_plain():
-    assert "closed orbit" in told(NAMED["ellipse"][0][:320], t=TIMES[:320])  # two laps of one
-    damped = solved(lambda _, s: [s[1], -4 * s[0] - 0.05 * s[1]], [1, 0])
-    assert told(damped) == ""
-    cycle = solved(lambda _, s: [s[1], -s[0] + 1.5 * (1 - s[0] ** 2) * s[1]], [1, 0], 5 * TIMES)
-    assert told(cycle[300:], t=TIMES[300:] * 5, terms=3) == ""
-    assert "closed orbit" in told(cycle[300:], t=TIMES[300:] * 5, terms=30)
+@pytest.mark.parametrize("terms", [{"x": -4.0}, {"x": -2.0, "x^3": -3.0}])
+def test_of_one_closed_orbit_a_law_is_told_without_a_doubt(terms):
+    law = PolynomialSystem.from_terms({"x": {"y": 1.0}, "y": terms}, degree=3)
+    x = law.simulate(TIMES, [1.0, 0.0])
+    found = discover(TIMES, x + 0.002 * np.random.default_rng(0).standard_normal(x.shape), order=1)
+    assert found.status == "ok"
+    assert score(found, law).exact
 
 
 def test_a_spring_that_is_alike_in_all_directions_is_not_told_from_a_flow():
@@ -126,9 +122,7 @@ def test_terms_that_cancel_are_told():
     assert warning.startswith("the terms of dx/dt cancel")
 
 
-@pytest.mark.parametrize(("name", "order"), [("bob", 2), ("pendulum", 1), ("pendulum, angle", 2)])
-def test_a_law_on_a_shape_is_never_simply_ok(name, order):
-    x, words = NAMED[name]
+def test_a_law_on_a_shape_is_never_simply_ok():
+    x, words = NAMED["bob"]
     noisy = x + 0.01 * x.std() * np.random.default_rng(0).standard_normal(x.shape)
-    found = discover(TIMES, noisy, order=order, degree=2 if name == "bob" else 3)
-    assert any(words in warning for warning in found.warnings)
+    assert any(words in warning for warning in discover(TIMES, noisy, order=2, degree=2).warnings)

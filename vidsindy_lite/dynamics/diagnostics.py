@@ -14,12 +14,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 from scipy.special import betaincc, chdtrc, chdtri
 
 from ..arrays import Bools, Floats, Ints
 from .collocation import CLEANEST, Fit, Linearisation, State, Status
-from .data import Trajectory, autocovariances, typical_step
+from .data import Trajectory, typical_step
 from .frames import closed, free_offsets, laws_at
 from .l0 import LEAST, STRONG, far_neighbours, newcomers, prior_penalties
 from .library import (
@@ -29,7 +28,7 @@ from .library import (
     shift_matrix,
     velocity_names,
 )
-from .mechanics import FAINT, Complexes, Round, on_circle, on_sphere
+from .mechanics import FAINT, Round, on_circle, on_sphere
 from .model import PolynomialSystem, place, spoken, sum_text
 from .noise import CONSISTENT, GROSS, passing, residual_noise
 from .problem import COARSE, Problem
@@ -37,7 +36,7 @@ from .result import Path
 
 # --------------------------------------------------------------------------------------------------
 # Where a motion takes place, looked at before any law: a coordinate at rest, a line, a plane, a
-# circle, a sphere, one closed orbit.
+# circle, a sphere.
 #
 # There the terms of a library depend on each other, and many laws fit alike. A motion is on a
 # shape if its distance from it, less the noise, is nothing of the size of the shape: not because
@@ -49,29 +48,24 @@ PLAIN = 3.0
 """Standard errors beyond which something stands out from the noise."""
 
 
-def shapes(
-    runs: Sequence[Trajectory], noise: Floats, names: Sequence[str], terms: Ints
-) -> Iterator[str]:
+def shapes(x: Floats, noise: Floats, names: Sequence[str]) -> Iterator[str]:
     """What there is to say of where a motion takes place, with what to do about it.
 
     Parameters
     ----------
-    runs : sequence of (t, x)
+    x : ndarray, shape (n, d)
         The data, in the user's units.
     noise : ndarray, shape (d,)
         Estimated standard deviation of the errors of each coordinate.
     names : sequence of str
         Of the coordinates.
-    terms : ndarray of int, shape (d,)
-        How many coefficients of each coordinate's equation the data have to settle.
     """
-    x = np.concatenate([values for _, values in runs])
     moves = _moving(x, noise)
     for j in np.flatnonzero(~moves).tolist():
         yield f"{names[j]} moves by no more than a part of its noise: leave it out"
     if not moves.any():
         return
-    x, noise, terms = x[:, moves], noise[moves], terms[moves]
+    x, noise = x[:, moves], noise[moves]
     directions, flat = _across(x, noise)
     d, where = x.shape[1], _round(x, noise, flat)
     if where is not None:
@@ -89,8 +83,6 @@ def shapes(
             f"the motion stays {shape} ({relations}): there its coordinates depend on each other "
             f"and many laws fit alike; give {d - flat} of them, or add runs that leave it"
         )
-    if len(runs) == 1:
-        yield from _closed(runs[0][0], x, noise, terms)
 
 
 def _moving(x: Floats, noise: Floats) -> Bools:
@@ -168,84 +160,6 @@ def _round(x: Floats, noise: Floats, flat: int, places: bool = False) -> Round |
     back = np.abs(np.diff(pieces)).sum() > 1.5 * length
     bound = back or (d > 2 or places) and length > np.pi
     return where if bound and _on(off, error, widths[-2], 10 * CLOSE if back else CLOSE) else None
-
-
-def _closed(t: Floats, x: Floats, noise: Floats, terms: Ints, most: int = 3000) -> Iterator[str]:
-    """Is the motion one lap after the other on the same orbit, and that too plain for a law?
-
-    It takes one number of the orbit more than the law has coefficients to test it.
-    """
-    scale = x.std(axis=0)
-    standard, errors = (x - x.mean(axis=0)) / scale, float(np.sqrt(((noise / scale) ** 2).mean()))
-    thin = slice(None, None, -(-len(t) // most))
-    for near in _periods(t, standard, errors, min(len(t), most)):
-        period, left, numbers = _orbit(t[thin] - t[0], standard[thin], near)
-        if _on(left, errors, 1.0):
-            scant = np.flatnonzero(numbers <= terms + 1)
-            if len(scant):
-                yield (
-                    f"the motion repeats one closed orbit (period {period:.4g}), which tells as "
-                    f"many numbers ({numbers[scant[0]]}) as a law has coefficients "
-                    f"({terms[scant[0]]}), or hardly more: what the law says off this orbit is not "
-                    "tested; add runs from other starts"
-                )
-            return
-
-
-def _periods(t: Floats, x: Floats, noise: float, size: int, laps: float = 1.6) -> list[float]:
-    """Lags after which a motion is near where it was, the shortest first; four at most.
-
-    So many laps have to be seen; two are near at a third of the motion's standard deviation.
-    """
-    even = np.linspace(t[0], t[-1], size)
-    u = np.stack([np.interp(even, t, column) for column in x.T], axis=1)
-    squares = np.append(0.0, np.cumsum((u**2).sum(axis=1)))
-    lags = np.arange(int(size / laps))
-    later, earlier = squares[-1] - squares[lags], squares[size - lags]
-    together = autocovariances([u]).sum(axis=1)[lags]
-    apart = (later + earlier - 2 * together) / np.minimum(later, earlier) / 2
-    first = int((apart > 0.5).argmax())
-    inner = apart[1:-1]
-    low = (inner <= apart[:-2]) & (inner <= apart[2:]) & (inner < 0.3**2 + noise**2)
-    found = np.flatnonzero(low) + 1
-    return [float(even[k] - t[0]) for k in found[found > first][:4]] if first else []
-
-
-def _orbit(t: Floats, x: Floats, period: float, harmonics: int = 25) -> tuple[float, Floats, Ints]:
-    """The closed orbit with the period near one that fits samples best: a Fourier series in time.
-
-    Its period; what it leaves of the samples, (n, d), made up for the freedom that it used; and how
-    many numbers of each coordinate stand out from the noise, (d,), counted from a time at which the
-    largest first harmonic is at its height.
-    """
-    laps = t[-1] / period
-    most = int(np.clip(len(t) / laps / 6, 1, harmonics))
-
-    def left(log: float, around: float, count: int) -> float:
-        return float((_series(t, x, around * np.exp(log), count)[1] ** 2).sum())
-
-    for count in sorted({min(2, most), min(6, most), most}):
-        reach = 0.5 / laps / count
-        period *= float(np.exp(minimize_scalar(
-            left, args=(period, count), bounds=(-reach, reach), method="bounded",
-            options={"xatol": 1e-4 * reach},
-        ).x))  # fmt: skip
-    waves, residual = _series(t, x, period, most)
-    residual /= np.sqrt(max(1 - (2 * most + 1) / len(t), 0.1))
-    strongest = waves[0, np.abs(waves[0]).argmax()]
-    parts = waves * ((strongest.conj() / np.abs(strongest)) ** np.arange(1, most + 1))[:, None]
-    seen = PLAIN * np.sqrt(2 * (residual**2).mean(axis=0) / len(t))
-    return period, residual, (np.abs([parts.real, parts.imag]) > seen).sum(axis=(0, 1))
-
-
-def _series(t: Floats, x: Floats, period: float, harmonics: int) -> tuple[Complexes, Floats]:
-    """Amplitudes of harmonics, (k, d), that fit samples best, and what they leave, (n, d)."""
-    first = np.exp(2j * np.pi / period * t)
-    powers = np.cumprod(np.repeat(first[:, None], harmonics, axis=1), axis=1)
-    terms = np.hstack([np.ones((len(t), 1)), powers.real, powers.imag])
-    gram = terms.T @ terms + 1e-9 * len(t) * np.eye(terms.shape[1])
-    found = np.linalg.solve(gram, terms.T @ x)
-    return found[1 : 1 + harmonics] - 1j * found[1 + harmonics :], x - terms @ found
 
 
 def cancelling(law: PolynomialSystem, x: Floats, most: float = 300.0) -> Iterator[str]:
@@ -672,12 +586,10 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
     """What follows from where the motion takes place."""
     measured, names = problem.measured[0][1].shape[1], problem.form.names
     noise = (problem.noise * problem.units.scale)[:measured]
-    # Who names a sine knows more than one orbit tells.
-    terms = fit.state.active.sum(axis=0)[-measured:] * (not problem.form.functions)
-    rows = [np.isfinite(values).all(axis=1) for _, values in problem.measured]
-    whole = [(t[r], x[r]) for r, (t, x) in zip(rows, problem.measured, strict=True) if r.any()]
-    if whole:
-        yield from shapes(whole, noise, names[:measured], terms)
+    x = np.concatenate([values for _, values in problem.measured])
+    whole = x[np.isfinite(x).all(axis=1)]
+    if len(whole):
+        yield from shapes(whole, noise, names[:measured])
     x, _ = fit.collocation.node_states(fit.state.control_points)
     yield from cancelling(problem.law(fit.state), x - fit.state.offset)
     yield from tied(names[: problem.form.states], x[:, : problem.form.states])
