@@ -402,7 +402,8 @@ def _law(
     if law.swing is not None:
         circle = on_circle(x, law.swing.circle.axes[0], modes)
         angle, shared = circle.angle[there, None], np.asarray(circle.systematic)[:, there]
-        return homogeneous(t[there], angle, ("angle",), shared) or law.swing.law, circle
+        turning = homogeneous(t[there], angle, ("angle",), shared)
+        return turning if turning and not turning.warnings else law.swing.law, circle
     if len(axes) == 1:
         law = replace(law, orientation=np.pad(axes, ((0, 0), (0, 1))))
     return law, None

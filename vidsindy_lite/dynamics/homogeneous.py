@@ -20,6 +20,7 @@ from scipy.special import chdtri, exprel, fdtri
 
 from ..arrays import Bools, Floats, Ints
 from .bspline import smooth
+from .collocation import CLEANEST
 from .data import inflation
 from .library import monomial_exponents, velocity_names
 from .mechanics import Quantity
@@ -27,6 +28,10 @@ from .model import PolynomialSystem
 from .noise import GROSS
 from .problem import FALSE_ALARM, SURE
 from .result import Discovery, Plateau
+
+MISSES = 5.0
+"""Errors that a flight leaves over those from sample to sample: of noise that forgets a tenth of
+itself from one to the next it leaves 3 to 4."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,10 +132,12 @@ def homogeneous(
     Raises
     ------
     ValueError
-        If there are fewer than six samples.
+        If there are fewer than six samples, or all are alike.
     """
     if len(x) < 6:  # nothing is left over of a throw with drag
         raise ValueError(f"x: must hold at least 6 places, got {len(x)}")
+    if not np.ptp(x, axis=0).any():
+        raise ValueError("x: must hold a motion, got one that stands still")
     m, middle = x.shape[1], (t[0] + t[-1]) / 2
     since, numbers = t - middle, np.arange(3 * m + 1)
     classes = [Flight.fitted(since, x, numbers < count) for count in (m, 2 * m, 3 * m, 3 * m + 1)]
@@ -162,7 +169,10 @@ def homogeneous(
         )
         for j in range(found.system.d)
     )
-    doubts = *(_doubt(flight, richer, penalty) or _bent(since, x, flight)), *_strangers(t, x)
+    doubts = (
+        _doubt(flight, richer, penalty) or _bent(since, x, flight) or _missing(x, flight, noise)
+    )
+    doubts = *doubts, *_strangers(t, x)
     return replace(found, warnings=doubts, path=path)
 
 
@@ -196,6 +206,19 @@ def _bent(t: Floats, x: Floats, flight: Flight) -> tuple[str, ...]:
     return (
         f"the path bends as no force does that is the same everywhere: two powers of the time more "
         f"would leave {share:.0f} % of the errors (the target may be held, or its errors smooth)",
+    )
+
+
+def _missing(x: Floats, flight: Flight, noise: float) -> tuple[str, ...]:
+    """Whether it leaves far more than the path scatters from one sample to the next, or jumps."""
+    steps = np.abs(np.diff(flight.left, axis=0))
+    # Of normal errors the median of a difference's size is .954 of their standard deviation.
+    scatter = max(float(np.median(steps)) / 0.954, CLEANEST * float(x.std()))
+    if flight.error < MISSES * min(scatter, noise) and steps.max() < 2 * GROSS * scatter:
+        return ()
+    return (
+        f"a flight leaves {flight.error:.3g}, and the path scatters by {scatter:.3g} from sample "
+        "to sample: something else pulls, the track jumps or lacks frames, or errors are smooth",
     )
 
 
