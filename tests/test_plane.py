@@ -100,6 +100,13 @@ def test_motions_that_are_no_plain_flight():
     assert straight.equations() == "x'' = 0\ny'' = 0"
     slowed = homogeneous(t, noisy(np.outer(t - 0.01 * t**2, (0.5, 0.2)), 0), ("x", "y"))
     assert slowed.warnings[0].startswith("a constant force of 0.01")
+    assert "would leave" in homogeneous(t[:6], noisy(x, 0)[:6] * 2, ("x", "y")).warnings[0]
+    jumps = x + 0.1 * (np.arange(len(x)) > 20)[:, None]
+    assert "the track jumps" in homogeneous(t, noisy(jumps, 0), ("x", "y")).warnings[0]
+    arc = 0.4 * np.column_stack([np.cos(t), np.sin(t)])
+    assert "the path bends" in homogeneous(t, noisy(arc, 0), ("x", "y")).warnings[0]
+    with pytest.raises(ValueError, match="x: must hold a motion, got one that stands still"):
+        homogeneous(t, np.ones((len(t), 2)), ("x", "y"))
     t = np.arange(60) / 30
     swings = np.column_stack([0.1 * np.sin(4 * t), 0.2 * np.cos(6 * t)])
     assert homogeneous(t, noisy(swings, 0), ("x", "y")) is None

@@ -170,9 +170,9 @@ def homogeneous(
         for j in range(found.system.d)
     )
     doubts = (
-        _doubt(flight, richer, penalty) or _bent(since, x, flight) or _missing(x, flight, noise)
+        _doubt(flight, richer, penalty) or _bent(since, x, flight) or _doubt(law, flight, penalty)
     )
-    doubts = *doubts, *_strangers(t, x)
+    doubts = *(doubts or _missing(x, flight, noise)), *_strangers(t, x)
     return replace(found, warnings=doubts, path=path)
 
 
