@@ -29,10 +29,6 @@ from .noise import GROSS
 from .problem import FALSE_ALARM, SURE
 from .result import Discovery, Plateau
 
-MISSES = 5.0
-"""Errors that a flight leaves over those from sample to sample: of noise that forgets a tenth of
-itself from one to the next it leaves 3 to 4."""
-
 
 @dataclass(frozen=True, eq=False)
 class Flight:
@@ -209,12 +205,15 @@ def _bent(t: Floats, x: Floats, flight: Flight) -> tuple[str, ...]:
     )
 
 
-def _missing(x: Floats, flight: Flight, noise: float) -> tuple[str, ...]:
-    """Whether it leaves far more than the path scatters from one sample to the next, or jumps."""
+def _missing(x: Floats, flight: Flight, noise: float, most: float = 5.0) -> tuple[str, ...]:
+    """Whether it leaves far more than the path scatters from one sample to the next, or jumps.
+
+    Of noise that forgets a tenth of itself from one to the next it leaves 3 to 4 times as much.
+    """
     steps = np.abs(np.diff(flight.left, axis=0))
     # Of normal errors the median of a difference's size is .954 of their standard deviation.
     scatter = max(float(np.median(steps)) / 0.954, CLEANEST * float(x.std()))
-    if flight.error < MISSES * min(scatter, noise) and steps.max() < 2 * GROSS * scatter:
+    if flight.error < most * min(scatter, noise) and steps.max() < 2 * GROSS * scatter:
         return ()
     return (
         f"a flight leaves {flight.error:.3g}, and the path scatters by {scatter:.3g} from sample "
