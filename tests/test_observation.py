@@ -46,6 +46,17 @@ def test_a_view_along_the_motion_helps_though_its_lag_is_not_told():
     np.testing.assert_allclose(law.fitted, x, atol=1e-6)  # along z, whatever its law calls that
 
 
+def test_a_throw_before_three_cameras_has_the_law_of_its_flight():
+    t, rng = np.arange(40) / 30, np.random.default_rng(0)
+    x = np.outer(t, (1.5, 0.4, 5)) - np.outer(4.905 * t**2, (0, 0, 1))
+    rig = vl.Rig.around(x)
+    tracks = [camera.project(x) + 0.3 * rng.normal(size=(40, 2)) for camera in rig.cameras]
+    found = vl.discover_from_tracks(tracks, rig, t)
+    assert found.status == "ok"
+    assert abs(found.g.value - 9.81) < 3 * found.g.error < 0.1
+    np.testing.assert_allclose(found.fitted, x, atol=0.01)
+
+
 def test_given_lags_that_are_off_by_a_fraction_are_told(case):
     rig, tracks = case
     for off, told in ((0.0, False), (0.01, False), (0.05, True)):

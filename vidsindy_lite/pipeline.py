@@ -775,8 +775,8 @@ def _with_law(seen: Observation, names: Sequence[str], law: dict[str, Any]) -> V
             raise ValueError("tracks: must show a target that moves, got one that stands still")
         x, modes, found = seen.x[:, moves], seen.systematic[..., moves], None
         if default and seen.targets == 1:
-            rows, axes = np.isfinite(x).all(axis=1), dynamics.variable_names(x.shape[1])
-            found = dynamics.homogeneous(seen.t[rows], x[rows], axes, modes[:, rows])
+            rows, called = np.isfinite(x).all(axis=1), dynamics.variable_names(x.shape[1])
+            found = dynamics.homogeneous(seen.t[rows], x[rows], called, modes[:, rows])
         found = found or dynamics.discover(seen.t, x, systematic=modes, **law)
     axes = np.eye(len(moves))[moves]
     if not moves[: len(axes)].all():  # else they are the first, as a law's are

@@ -9,6 +9,7 @@ one before it, the simplest is taken that the data bear: forces that are the sam
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -81,7 +82,7 @@ class PlaneDiscovery(VideoDiscovery):
         """The circle and the law of the angle on it, if the target swings on one."""
         return None if self.circle is None else Swing(self.circle, self.discovery)
 
-    @property
+    @cached_property
     def leaning(self) -> float:
         """By how many degrees a motion along a line leans from the vertical; else 0.
 
@@ -400,9 +401,9 @@ def _law(
         asked, axes = asked | {"degree": 1, "order": 2}, _axes(t[there], x[there])
     law = discover(t, x @ axes.T, systematic=modes[:1] @ axes.T, **asked)
     if law.swing is not None:
-        circle = on_circle(x, law.swing.circle.axes[0], modes)
+        circle, name = on_circle(x, law.swing.circle.axes[0], modes), law.swing.law.system.names[:1]
         angle, shared = circle.angle[there, None], np.asarray(circle.systematic)[:, there]
-        turning = homogeneous(t[there], angle, ("angle",), shared)
+        turning = homogeneous(t[there], angle, name, shared)
         return turning if turning and not turning.warnings else law.swing.law, circle
     if len(axes) == 1:
         law = replace(law, orientation=np.pad(axes, ((0, 0), (0, 1))))

@@ -122,9 +122,6 @@ def test_value_text_and_latex():
     assert (str(law), law._repr_latex_()) == (law.text(), f"${law.latex()}$")
 
 
-# -------------------------------------------------------------------------------------------- paths
-
-
 def circle(x):
     return np.stack([x[..., 1], -x[..., 0]], axis=-1)
 
@@ -165,8 +162,6 @@ def test_a_long_motion_is_followed_to_its_end():
     np.testing.assert_allclose(path[-1], [np.sin(600.0), np.cos(600.0)], atol=1e-6)
     assert end == ""
 
-
-# -------------------------------------------------------------------------------------------- input
 
 T, X = np.arange(5.0), np.ones((5, 2))
 

@@ -218,9 +218,6 @@ def test_bad_input_is_refused(x, options, message):
         discover(np.arange(len(x)), x, **options)
 
 
-# ------------------------------------------------------------------------------------------ threads
-
-
 def threads():
     return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
 
@@ -239,8 +236,6 @@ def test_a_discovery_has_one_thread_and_gives_back_what_was_there(monkeypatch):
         assert threads() == {2}
     assert within == [{1}, {1}]
 
-
-# ----------------------------------------------------------------------------------------- rounding
 
 PROCESS = "import json, test_solver; print(json.dumps(test_solver.outcome()))"
 

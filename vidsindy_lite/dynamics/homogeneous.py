@@ -21,7 +21,7 @@ from scipy.special import chdtri, exprel, fdtri
 from ..arrays import Bools, Floats, Ints
 from .bspline import smooth
 from .collocation import CLEANEST
-from .data import inflation
+from .data import check_trajectory, inflation
 from .library import monomial_exponents, velocity_names
 from .mechanics import Quantity
 from .model import PolynomialSystem
@@ -128,8 +128,9 @@ def homogeneous(
     Raises
     ------
     ValueError
-        If there are fewer than six samples, or all are alike.
+        If there are fewer than six samples, all are alike, or as `check_trajectory` says.
     """
+    t, x = check_trajectory(t, x)
     if len(x) < 6:  # nothing is left over of a throw with drag
         raise ValueError(f"x: must hold at least 6 places, got {len(x)}")
     if not np.ptp(x, axis=0).any():
@@ -168,7 +169,7 @@ def homogeneous(
     doubts = (
         _doubt(flight, richer, penalty) or _bent(since, x, flight) or _doubt(law, flight, penalty)
     )
-    doubts = *(doubts or _missing(x, flight, noise)), *_strangers(t, x)
+    doubts = *(doubts or _misfit(x, flight, noise)), *_outlying_ends(t, x)
     return replace(found, warnings=doubts, path=path)
 
 
@@ -205,10 +206,10 @@ def _bent(t: Floats, x: Floats, flight: Flight) -> tuple[str, ...]:
     )
 
 
-def _missing(x: Floats, flight: Flight, noise: float, most: float = 5.0) -> tuple[str, ...]:
+def _misfit(x: Floats, flight: Flight, noise: float, most: float = 5.0) -> tuple[str, ...]:
     """Whether it leaves far more than the path scatters from one sample to the next, or jumps.
 
-    Of noise that forgets a tenth of itself from one to the next it leaves 3 to 4 times as much.
+    Noise whose autocorrelation from one to the next is .9 leaves 3 to 4 times as much.
     """
     steps = np.abs(np.diff(flight.left, axis=0))
     # Of normal errors the median of a difference's size is .954 of their standard deviation.
@@ -221,7 +222,7 @@ def _missing(x: Floats, flight: Flight, noise: float, most: float = 5.0) -> tupl
     )
 
 
-def _strangers(t: Floats, x: Floats) -> tuple[str, ...]:
+def _outlying_ends(t: Floats, x: Floats) -> tuple[str, ...]:
     """Places that are no part of the flight, with drag, which all but the two ends tell.
 
     A tenth of the places on either side is foretold from those between: a hand or the ground may
