@@ -332,7 +332,7 @@ def test_an_interruption_keeps_the_track(monkeypatch, tmp_path, capsys):
 
     film = vl.write_video(tmp_path / "a.mov", np.full((34, 90, 120, 3), 90, np.uint8))
     filmed(monkeypatch, pixels_of(flight()[1]))
-    monkeypatch.setattr(plane, "homogeneous", interrupted)
+    monkeypatch.setattr(plane, "simplest", interrupted)
     folder = tmp_path / "law"
     assert main(["discover", str(film), "--out", str(folder)]) == 130
     kept = f"stopped; the tracks are kept beside {folder / 'report.html'}"

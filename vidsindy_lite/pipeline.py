@@ -7,7 +7,7 @@ looks for the law that it obeys.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,7 +31,7 @@ from .checks import (
     check_vector,
     shown,
 )
-from .dynamics import Discovery, Library, Quantity, Swing
+from .dynamics import Discovery, Library, Quantity, Round, Swing
 from .progress import bar
 from .vision import Hint, TrackFile
 
@@ -521,9 +521,13 @@ class VideoDiscovery(Observation):
     discovery : Discovery
         The law in the frame of the rig and in its own, sparsest frame; in other axes if these were
         learned.
+    circle : Round, optional
+        Where the target is bound to a circle, and no law was asked for: then the law is that of the
+        angle on it.
     """
 
     discovery: Discovery
+    circle: Round | None = None
 
     @property
     def fitted(self) -> Floats:
@@ -533,6 +537,11 @@ class VideoDiscovery(Observation):
         """
         law = self.discovery
         m = law.system.states // law.system.order
+        if self.circle is not None:
+            angle = law.curve(self.t)[:, :1]
+            away = np.hstack([np.cos(angle), np.sin(angle)]) @ self.circle.axes
+            path = self.circle.centre + self.circle.radius * away
+            return path @ np.eye(path.shape[1], self.x.shape[1])
         turn = np.eye(self.x.shape[1])[:m] if law.orientation is None else law.orientation
         still = np.nanmean(self.x - self.x @ turn.T @ turn, axis=0)  # of what the law does not move
         return law.curve(self.t)[:, :m] @ turn + still
@@ -540,7 +549,7 @@ class VideoDiscovery(Observation):
     @property
     def swing(self) -> Swing | None:
         """The circle to which the target is bound, and the law of its angle; None elsewhere."""
-        return self.discovery.swing
+        return Swing(self.circle, self.discovery) if self.circle else self.discovery.swing
 
     @property
     def g(self) -> Quantity | None:
@@ -573,7 +582,11 @@ class VideoDiscovery(Observation):
         warnings = (f"warning: {text}" for text in self.warnings)
         notes = [f"frame: {self.rig.note}"] if self.rig.note else []
         notes += [f"targets: {self.driven}"] if self.driven else []
-        return "\n".join([self.discovery.statement(), *notes, *warnings])
+        told = []
+        if self.circle is not None:
+            radius = f"{self.circle.radius:.4g} ± {self.circle.radius_error:.2g}"
+            told = [f"on a circle of radius {radius}" + (f"; {self.g}" if self.g else "")]
+        return "\n".join([*told, self.discovery.statement(), *notes, *warnings])
 
 
 def discover_from_videos(
@@ -773,18 +786,60 @@ def _with_law(seen: Observation, names: Sequence[str], law: dict[str, Any]) -> V
     with refusing("law", seen.tracks, names):
         if not moves.any():
             raise ValueError("tracks: must show a target that moves, got one that stands still")
-        x, modes, found = seen.x[:, moves], seen.systematic[..., moves], None
+        x, modes, circle = seen.x[:, moves], seen.systematic[..., moves], None
+
+        def other() -> Discovery:
+            return dynamics.discover(seen.t, x, systematic=modes, **law)
+
         if default and seen.targets == 1:
-            rows, called = np.isfinite(x).all(axis=1), dynamics.variable_names(x.shape[1])
-            found = dynamics.homogeneous(seen.t[rows], x[rows], called, modes[:, rows])
-        found = found or dynamics.discover(seen.t, x, systematic=modes, **law)
+            found, circle = simplest(seen.t, x, modes, other)
+        else:
+            found = other()
     axes = np.eye(len(moves))[moves]
-    if not moves[: len(axes)].all():  # else they are the first, as a law's are
+    if circle is not None:
+        circle = replace(circle, centre=circle.centre @ axes, axes=circle.axes @ axes)
+    elif not moves[: len(axes)].all():  # else they are the first, as a law's are
         turn = axes if found.orientation is None else found.orientation @ axes
         found = replace(found, orientation=turn)
     # Who keeps the law alone keeps the doubts about what it was found in.
     found = replace(found, warnings=(*seen.warnings, *found.warnings))
-    return VideoDiscovery(**vars(seen) | {"warnings": found.warnings}, discovery=found)
+    told = vars(seen) | {"warnings": found.warnings}
+    return VideoDiscovery(**told, discovery=found, circle=circle)
+
+
+def simplest(
+    t: Floats, x: Floats, modes: Floats, other: Callable[[], Discovery]
+) -> tuple[Discovery, Round | None]:
+    """Of nested laws of a body the simplest that the data bear.
+
+    Forces that are the same everywhere; on a circle the law of the angle, which is given with the
+    circle; and the other law, which is looked for where none of these holds.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+    x : ndarray, shape (n, m)
+        Places, a row with a NaN where they are not known.
+    modes : ndarray, shape (k, n, m)
+        Errors that all places share.
+    other : callable
+        What gives the other law.
+    """
+    rows = np.isfinite(x).all(axis=1)
+    names = dynamics.variable_names(x.shape[1])
+    law = dynamics.homogeneous(t[rows], x[rows], names, modes[:, rows])
+    if law is not None:
+        return law, None
+    law = other()
+    swing = law.swing
+    if swing is None:
+        return law, None
+    circle = dynamics.on_circle(x, swing.circle.axes[0], modes)
+    law, names = swing.law, swing.law.system.names[:1]
+    angle, shared = circle.angle[rows, None], np.asarray(circle.systematic)[:, rows]
+    turning = dynamics.homogeneous(t[rows], angle, names, shared)
+    law = law if turning is None or turning.warnings else turning
+    return replace(law, warnings=(*circle.warnings, *law.warnings)), circle
 
 
 # ----------------------------------------------------------------------------------------- refusals

@@ -18,8 +18,16 @@ import numpy as np
 from .arrays import Floats
 from .cameras import Lags, OrthographicCamera, Rig
 from .checks import check_array, check_number, check_path, check_positive, check_vector, shown
-from .dynamics import Discovery, Quantity, Round, Swing, discover, homogeneous, on_circle, smooth
-from .pipeline import VideoDiscovery, check_found, law_options, refusing, times_of, tracked
+from .dynamics import Discovery, Quantity, Round, discover, smooth
+from .pipeline import (
+    VideoDiscovery,
+    check_found,
+    law_options,
+    refusing,
+    simplest,
+    times_of,
+    tracked,
+)
 from .vision import Hint, check_detector, frame_clock, read_tracks, video_info
 
 MARK = 1.0
@@ -61,26 +69,18 @@ class PlaneCamera(OrthographicCamera):
         return mapped(np.asarray(np.linalg.inv(self.homography), float), x[:, :2])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PlaneDiscovery(VideoDiscovery):
     """A motion in the plane z = 0 of one camera, x rightwards and y upwards, and its law.
 
     Parameters
     ----------
     unit : {"m", "px"}
-        Of places.
-    circle : Round, optional
-        Where the target swings on a circle; then the law is that of the angle. That of what moves
-        along a line is the law of one coordinate, see `Discovery.orientation`.
+        Of places. The law of what moves along a line is that of one coordinate, see
+        `Discovery.orientation`.
     """
 
     unit: str
-    circle: Round | None = None
-
-    @property
-    def swing(self) -> Swing | None:
-        """The circle and the law of the angle on it, if the target swings on one."""
-        return None if self.circle is None else Swing(self.circle, self.discovery)
 
     @cached_property
     def leaning(self) -> float:
@@ -97,22 +97,6 @@ class PlaneDiscovery(VideoDiscovery):
     def g(self) -> Quantity | None:
         """As of any motion; None of what leans, since a slope or a table bears it."""
         return None if self.leaning else super().g
-
-    @property
-    def fitted(self) -> Floats:
-        """The path that obeys the law, in the shape of ``x``; NaN before and after it."""
-        if self.circle is None:
-            return super().fitted
-        angle = self.discovery.curve(self.t)[:, :1]
-        away = np.hstack([np.cos(angle), np.sin(angle)]) @ self.circle.axes
-        return _in_space(self.circle.centre + self.circle.radius * away)
-
-    def __str__(self) -> str:
-        told = super().__str__()
-        if self.circle is None:
-            return told
-        radius = f"{self.circle.radius:.4g} ± {self.circle.radius_error:.2g} {self.unit}"
-        return f"on a circle of radius {radius}{'' if self.g is None else f'; {self.g}'}\n{told}"
 
 
 def discover_from_video(
@@ -217,7 +201,6 @@ def discover_from_video(
     modes = np.stack([error * x, *_tilts(camera, pixels, middle)])[known]
     with refusing("law", [pixels], [name]):
         law, circle = _law(t, x, modes, asked)
-    doubts = law.warnings if circle is None else (*circle.warnings, *law.warnings)
     found = PlaneDiscovery(
         tracks=(pixels,), rig=rig, lags=Lags(np.zeros(1), np.ones(1), np.zeros(1), 0.0),
         t=t, x=_in_space(x), systematic=np.pad(modes, ((0, 0), (0, 0), (0, 1))),
@@ -229,12 +212,13 @@ def discover_from_video(
         )
         found = replace(found, rig=replace(rig, note=f"{rig.note}; along a line {borne}"))
     contradicted = _contradicted(found, up is not None or corners is not None, corners is None)
-    if doubts and frames is None:
+    if law.warnings and frames is None:
         contradicted.append(
             "frames: all were taken to be of one motion: if it begins in a hand or ends on the "
             "ground, give the first and the last frame that count"
         )
-    return replace(found, warnings=(*warnings, *doubts, *contradicted))
+    law = replace(law, warnings=(*warnings, *law.warnings, *contradicted))
+    return replace(found, warnings=law.warnings, discovery=law)
 
 
 Seen = tuple[Floats, Floats, int, Sequence[str]]
@@ -393,21 +377,18 @@ def _law(
     A plane that lies askew bends a path a little as other forces would: laws are told from each
     other without its modes, which are in the error bars of what flies and of what swings round.
     """
-    there, axes = np.isfinite(x[:, 0]), np.eye(2)
-    if asked["degree"] is None and asked["order"] == "auto":
-        flight = homogeneous(t[there], x[there], ("x", "y"), modes[:, there])
-        if flight is not None:
-            return flight, None
-        asked, axes = asked | {"degree": 1, "order": 2}, _axes(t[there], x[there])
-    law = discover(t, x @ axes.T, systematic=modes[:1] @ axes.T, **asked)
-    if law.swing is not None:
-        circle, name = on_circle(x, law.swing.circle.axes[0], modes), law.swing.law.system.names[:1]
-        angle, shared = circle.angle[there, None], np.asarray(circle.systematic)[:, there]
-        turning = homogeneous(t[there], angle, name, shared)
-        return turning if turning and not turning.warnings else law.swing.law, circle
-    if len(axes) == 1:
-        law = replace(law, orientation=np.pad(axes, ((0, 0), (0, 1))))
-    return law, None
+    if asked["degree"] is not None or asked["order"] != "auto":
+        return discover(t, x, systematic=modes[:1], **asked), None
+
+    def linear() -> Discovery:
+        there = np.isfinite(x[:, 0])
+        axes = _axes(t[there], x[there])
+        forces = asked | {"degree": 1, "order": 2}
+        law = discover(t, x @ axes.T, systematic=modes[:1] @ axes.T, **forces)
+        along = np.pad(axes, ((0, 0), (0, 1)))
+        return law if len(axes) == 2 else replace(law, orientation=along)
+
+    return simplest(t, x, modes, linear)
 
 
 def _axes(t: Floats, x: Floats) -> Floats:
