@@ -521,7 +521,7 @@ def diagnose(
         *_unmet(fit, remedy),
         *_contested(problem, fit.state, path, remedy),
         *_rivals(problem, fit, model, wider, path, law, remedy, clean),
-        *_sampling(problem, law, remedy),
+        *_sampling(problem, fit, law, remedy),
     )
 
 
@@ -757,13 +757,16 @@ def _far_neighbours(wider: Wider, remedy: str) -> Iterator[str]:
         )
 
 
-def _sampling(problem: Problem, law: PolynomialSystem, remedy: str) -> Iterator[str]:
+def _sampling(problem: Problem, fit: Fit, law: PolynomialSystem, remedy: str) -> Iterator[str]:
     """Are samples too few or too far apart for a law, or to tell kicks from a wrong one?
 
     A wrong law misses the same whenever the motion comes by.
     """
     form, turns = problem.form, problem.turns
-    samples = 2 * np.pi / typical_step(problem.trajectories)
+    # Along the law: between samples that are few it may turn more often than a smoothing tells.
+    x, slopes = fit.collocation.node_states(fit.state.control_points)
+    speed = np.sqrt((slopes**2).mean() / x.var(axis=0).mean())
+    samples = 2 * np.pi / typical_step(problem.trajectories) / speed
     # On a line nothing turns; a body need not, if it is seen from several starts.
     bound = form.states > 1 and (form.movable.all() or len(problem.trajectories) == 1)
     if turns < 1.5 and bound:
