@@ -72,6 +72,11 @@ class Flight:
         covariance[np.ix_(free, free)] = np.linalg.pinv(found.jac.T @ found.jac) * size
         return cls(whole(found.x), free, covariance, errors)
 
+    def shared(self, t: Floats, x: Floats, modes: Floats) -> Floats:
+        """What errors that all samples share, (k, n, m), add to the covariance."""
+        moved = [Flight.fitted(t, x + mode, self.free).theta - self.theta for mode in modes]
+        return np.sum([np.outer(one, one) for one in moved] or [0.0 * self.covariance], axis=0)
+
     @property
     def force(self) -> Floats:
         """The constant force, (m,)."""
@@ -149,12 +154,15 @@ def homogeneous(
     # Mean products of what the numbers of the richer law are off those of this one.
     apart = richer.theta - flight.theta
     covariance = (richer.covariance + np.outer(apart, apart)) * np.outer(flight.free, flight.free)
-    penalty = chdtri(1, FALSE_ALARM / (2 * m))
-    kept = flight.free & ((flight.theta**2 > penalty * np.diag(covariance)) | (numbers < 2 * m))
+    modes = np.zeros((0, *x.shape)) if systematic is None else systematic
+    shared, penalty = flight.shared(since, x, modes), chdtri(1, FALSE_ALARM / (2 * m))
+
+    def told(errors: Floats) -> Bools:
+        return flight.theta**2 > penalty * np.diag(errors)
+
+    kept = flight.free & (told(covariance + shared) | (numbers < 2 * m))
     law = Flight.fitted(since, x, kept)
-    for mode in () if systematic is None else systematic:
-        moved = Flight.fitted(since, x + mode, kept).theta - law.theta
-        covariance = covariance + np.outer(moved, moved)
+    covariance = covariance + law.shared(since, x, modes)
     found = _told(law, covariance * np.outer(kept, kept), t, names)
     spread, classes[best] = np.linalg.norm(x.std(axis=0)), law
     supports = [coefficients_of(one.theta, found.system.exponents) != 0 for one in classes]
@@ -166,9 +174,9 @@ def homogeneous(
         )
         for j in range(found.system.d)
     )
-    doubts = (
-        _doubt(flight, richer, penalty) or _bent(since, x, flight) or _doubt(law, flight, penalty)
-    )
+    doubts = _doubt(flight, richer, penalty) or _bent(since, x, flight)
+    if (flight.free & ~kept & told(flight.covariance + shared)).any():
+        doubts = doubts or _doubt(law, flight, penalty)
     doubts = *(doubts or _misfit(x, flight, noise)), *_outlying_ends(t, x)
     return replace(found, warnings=doubts, path=path)
 
