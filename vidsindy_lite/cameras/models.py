@@ -519,8 +519,11 @@ def undistorted(points: Floats, coefficients: Floats) -> Floats:
     NaN where the model shows none there, as beyond the circle where its image folds.
     """
     enough = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, _UNBENT, _SETTLED)
-    ideal = cv2.undistortPoints(points[:, None], np.eye(3), coefficients, criteria=enough)
-    found = np.asarray(ideal[:, 0], float)
+    found, seen = np.full(points.shape, np.nan), np.isfinite(points).all(axis=1)
+    if seen.any():  # a NaN would be tried to the last iteration, and no points are refused
+        given = points[seen, None]
+        ideal = cv2.undistortPoints(given, np.eye(3), coefficients, criteria=enough)
+        found[seen] = ideal[:, 0]
     found[~(np.abs(distorted(found, coefficients) - points).max(axis=1) < 1e-7)] = np.nan
     return found
 

@@ -639,8 +639,12 @@ def _unmet(fit: Fit, remedy: str) -> Iterator[str]:
 
 
 def _contested(problem: Problem, state: State, path: Path, remedy: str) -> Iterator[str]:
-    """Is another plateau more than half as wide, where errors last also one of larger errors?"""
-    lasting, law = problem.shared or path.level > path.lowest, problem.law(state)
+    """Is another plateau more than half as wide, which begins at errors as large as there may be?
+
+    Of errors that last nobody knows how large they are; those that samples share are given.
+    """
+    law, varies = problem.law(state), path.fit.collocation.systematic.std(axis=0)
+    largest = np.inf if path.level > path.lowest else np.sqrt((varies**2).sum(axis=1)).max()
     for own, plateaus in zip(path.of(state.active), path.plateaus, strict=True):
         near = [plateau for plateau in plateaus if plateau.low <= path.level]
         same = [plateau for plateau in near if (plateau.terms == own.terms).all()]
@@ -648,7 +652,8 @@ def _contested(problem: Problem, state: State, path: Path, remedy: str) -> Itera
         others = [
             plateau
             for plateau in plateaus
-            if (plateau.terms != own.terms).any() and (plateau in near or lasting and same)
+            if (plateau.terms != own.terms).any()
+            and (plateau in near or (same and plateau.low < largest))
         ]
         rival = max(others, key=path.width, default=None)
         if rival and path.width(rival) > 0.5 * path.width(own):
