@@ -7,7 +7,7 @@ looks for the law that it obeys.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,9 +15,10 @@ from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import qr
 
 from . import cameras, dynamics, vision
-from .arrays import Floats
+from .arrays import Bools, Floats
 from .cameras import Clock, Footage, Lags, Rig
 from .checks import (
     check_choice,
@@ -509,6 +510,8 @@ def _rig_warnings(
 
 # ---------------------------------------------------------------------------------------- the law
 
+STILL = 1.5
+"""Spread across a plane or a line, over the noise, up to which a motion in space stays in it."""
 _OTHER_CLOCK = 1e-3  # share by which given and stated frame rates may differ without a word
 
 
@@ -787,20 +790,17 @@ def _with_law(seen: Observation, names: Sequence[str], law: dict[str, Any]) -> V
         if not moves.any():
             raise ValueError("tracks: must show a target that moves, got one that stands still")
         x, modes, circle = seen.x[:, moves], seen.systematic[..., moves], None
-
-        def other() -> Discovery:
-            return dynamics.discover(seen.t, x, systematic=modes, **law)
-
         if default and seen.targets == 1:
-            found, circle = simplest(seen.t, x, modes, other)
+            found, circle = simplest(seen.t, x, modes, modes, law, STILL)
         else:
-            found = other()
+            found = dynamics.discover(seen.t, x, systematic=modes, **law)
     axes = np.eye(len(moves))[moves]
     if circle is not None:
         circle = replace(circle, centre=circle.centre @ axes, axes=circle.axes @ axes)
+    elif found.orientation is not None:
+        found = replace(found, orientation=found.orientation @ axes)
     elif not moves[: len(axes)].all():  # else they are the first, as a law's are
-        turn = axes if found.orientation is None else found.orientation @ axes
-        found = replace(found, orientation=turn)
+        found = replace(found, orientation=axes)
     # Who keeps the law alone keeps the doubts about what it was found in.
     found = replace(found, warnings=(*seen.warnings, *found.warnings))
     told = vars(seen) | {"warnings": found.warnings}
@@ -808,12 +808,12 @@ def _with_law(seen: Observation, names: Sequence[str], law: dict[str, Any]) -> V
 
 
 def simplest(
-    t: Floats, x: Floats, modes: Floats, other: Callable[[], Discovery]
+    t: Floats, x: Floats, modes: Floats, told: Floats, law: dict[str, Any], most: float
 ) -> tuple[Discovery, Round | None]:
     """Of nested laws of a body the simplest that the data bear.
 
-    Forces that are the same everywhere; on a circle the law of the angle, which is given with the
-    circle; and the other law, which is looked for where none of these holds.
+    Forces that are the same everywhere; where the body is bound to a plane or a line, linear ones
+    along it, and on a circle the law of the angle, which is given with the circle; else any other.
 
     Parameters
     ----------
@@ -822,24 +822,53 @@ def simplest(
         Places, a row with a NaN where they are not known.
     modes : ndarray, shape (k, n, m)
         Errors that all places share.
-    other : callable
-        What gives the other law.
+    told : ndarray, shape (k', n, m)
+        Those of them that do not bend the paths of linear forces.
+    law : dict
+        What else `discover` takes.
+    most : float
+        See `directions`.
     """
     rows = np.isfinite(x).all(axis=1)
     names = dynamics.variable_names(x.shape[1])
-    law = dynamics.homogeneous(t[rows], x[rows], names, modes[:, rows])
-    if law is not None:
-        return law, None
-    law = other()
-    swing = law.swing
+    flight = dynamics.homogeneous(t[rows], x[rows], names, modes[:, rows])
+    if flight is not None:
+        return flight, None
+    axes = directions(t[rows], x[rows], most)
+    bound = {"degree": 1, "order": 2} if len(axes) < 3 else {}
+    found = dynamics.discover(t, x @ axes.T, systematic=told @ axes.T, **law | bound)
+    swing = found.swing
     if swing is None:
-        return law, None
-    circle = dynamics.on_circle(x, swing.circle.axes[0], modes)
-    law, names = swing.law, swing.law.system.names[:1]
+        turned = not np.array_equal(axes, np.eye(x.shape[1]))
+        return (replace(found, orientation=axes) if turned else found), None
+    circle = dynamics.on_circle(x, swing.circle.axes[0] @ axes, modes)
+    found, names = swing.law, swing.law.system.names[:1]
     angle, shared = circle.angle[rows, None], np.asarray(circle.systematic)[:, rows]
     turning = dynamics.homogeneous(t[rows], angle, names, shared)
-    law = law if turning is None or turning.warnings else turning
-    return replace(law, warnings=(*circle.warnings, *law.warnings)), circle
+    found = found if turning is None or turning.warnings else turning
+    return replace(found, warnings=(*circle.warnings, *found.warnings)), circle
+
+
+def directions(t: Floats, x: Floats, most: float) -> Floats:
+    """Orthonormal directions, (k, d), along which a path, (n, d), moves, and near the axes.
+
+    A spread of ``most`` times the noise is none.
+    """
+
+    def moves(axes: Floats) -> Bools:
+        along = x @ axes.T
+        noise, spread = dynamics.smooth([(t, along)], np.random.default_rng(0)).noise, along.std(0)
+        return np.asarray(spread > np.maximum(most * noise, 1e-9 * spread.max()))
+
+    axes = np.eye(x.shape[1])
+    axes = axes[moves(axes)]
+    _, _, own = np.linalg.svd((x - x.mean(axis=0)) @ axes.T, full_matrices=False)
+    own = own[moves(own @ axes)]
+    if len(own) == len(axes):
+        return axes
+    nearest = np.sort(qr(own, pivoting=True)[2][: len(own)])
+    u, _, v = np.linalg.svd(own[:, nearest])
+    return (u @ v).T @ own @ axes
 
 
 # ----------------------------------------------------------------------------------------- refusals

@@ -11,17 +11,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from .arrays import Floats
 from .cameras import Lags, OrthographicCamera, Rig
 from .checks import check_array, check_number, check_path, check_positive, check_vector, shown
-from .dynamics import Discovery, Quantity, Round, discover, smooth
+from .dynamics import Quantity, discover
 from .pipeline import (
     VideoDiscovery,
     check_found,
+    directions,
     law_options,
     refusing,
     simplest,
@@ -89,7 +90,7 @@ class PlaneDiscovery(VideoDiscovery):
         And where that may be how the telephone was held.
         """
         there = np.isfinite(self.x[:, 0])
-        axes = _axes(self.t[there], self.x[there, :2])
+        axes = directions(self.t[there], self.x[there, :2], ASIDE)
         off = float(np.arctan2(*np.abs(axes[0])))
         return float(np.rad2deg(off)) if len(axes) == 1 and off > SURE * HELD else 0.0
 
@@ -200,7 +201,14 @@ def discover_from_video(
     known = slice(3 if corners is None else 1) if measured else slice(0)
     modes = np.stack([error * x, *_tilts(camera, pixels, middle)])[known]
     with refusing("law", [pixels], [name]):
-        law, circle = _law(t, x, modes, asked)
+        # A plane that lies askew bends a path a little as other forces would: laws are told from
+        # each other without that.
+        if asked["degree"] is None and asked["order"] == "auto":
+            law, circle = simplest(t, x, modes, modes[:1], asked, ASIDE)
+        else:
+            law, circle = discover(t, x, systematic=modes[:1], **asked), None
+    if law.orientation is not None:
+        law = replace(law, orientation=np.pad(law.orientation, ((0, 0), (0, 1))))
     found = PlaneDiscovery(
         tracks=(pixels,), rig=rig, lags=Lags(np.zeros(1), np.ones(1), np.zeros(1), 0.0),
         t=t, x=_in_space(x), systematic=np.pad(modes, ((0, 0), (0, 0), (0, 1))),
@@ -365,39 +373,6 @@ def _tilts(camera: PlaneCamera, pixels: Floats, middle: Floats) -> list[Floats]:
     nearer = TILTED * away / (FOCAL * max(camera.image_size))
     x = mapped(camera.homography, pixels)
     return [mapped(camera.homography, pixels + nearer[:, [j]] * away) - x for j in (0, 1)]
-
-
-def _law(
-    t: Floats, x: Floats, modes: Floats, asked: dict[str, Any]
-) -> tuple[Discovery, Round | None]:
-    """The law of places: of nested ones the simplest that the data bear, or the one asked for.
-
-    Or that of an angle, and the circle on which it is.
-
-    A plane that lies askew bends a path a little as other forces would: laws are told from each
-    other without its modes, which are in the error bars of what flies and of what swings round.
-    """
-    if asked["degree"] is not None or asked["order"] != "auto":
-        return discover(t, x, systematic=modes[:1], **asked), None
-
-    def linear() -> Discovery:
-        there = np.isfinite(x[:, 0])
-        axes = _axes(t[there], x[there])
-        forces = asked | {"degree": 1, "order": 2}
-        law = discover(t, x @ axes.T, systematic=modes[:1] @ axes.T, **forces)
-        along = np.pad(axes, ((0, 0), (0, 1)))
-        return law if len(axes) == 2 else replace(law, orientation=along)
-
-    return simplest(t, x, modes, linear)
-
-
-def _axes(t: Floats, x: Floats) -> Floats:
-    """Those of the plane, or the one along which a path moves that is a line within its noise."""
-    _, sizes, axes = np.linalg.svd(x - x.mean(axis=0), full_matrices=False)
-    noise = smooth([(t, x @ axes.T)], np.random.default_rng(0)).noise
-    if sizes[1] > ASIDE * noise[1] * np.sqrt(len(x)):
-        return np.eye(2)
-    return axes[:1] * np.sign(axes[0, np.abs(axes[0]).argmax()])
 
 
 def _contradicted(found: PlaneDiscovery, vertical: bool, askew: bool) -> list[str]:
