@@ -309,12 +309,12 @@ def _learned(videos: _Videos) -> Lags:
     every = [videos.fitted(s.footage.lags, loose=loose) for s in chosen]
     found = sorted(_different([f for f in every if f]), key=score)
     if not found:
-        return _untold(videos, False)
+        return _untold(videos)
     if not agrees(found[0]):  # as no lag does, where clocks drift by more than a part of a frame
         found = sorted(map(drifted, found), key=score)
     alike = [f for f in found if score(f) <= max(ALIKE * score(found[0]), FINE)]
     if len(alike) > 1 and score(found[0]) > DISAGREEMENT:
-        return _untold(videos, False)
+        return _untold(videos)
     best = min(alike, key=lambda f: (not near(f, first), _moved(f)))
     told = _told(videos, drifted(best))
     if len(alike) > 1 and not near(best, first):
@@ -337,7 +337,8 @@ def _searched(videos: _Videos) -> tuple[bool, list[Adjustment]]:
             return False, exact
     # Where the rig is wrong, its best lags may be wrong as well: so all are tried again.
     loose = _climbed(videos, promising, True)
-    if loose and score(loose[0]) * BETTER < score(exact[0]):
+    told = score(exact[0]) > DISAGREEMENT or (loose and shares(loose[0]).all())
+    if loose and told and score(loose[0]) * BETTER < score(exact[0]):
         return True, loose
     return False, exact
 
@@ -386,7 +387,7 @@ def _told(videos: _Videos, fit: Adjustment) -> Lags:
     """What a fit tells of the lags, or that it tells nothing."""
     lags, count = fit.footage.lags.copy(), len(fit.start) - 1
     if not shares(fit).all():
-        return _untold(videos, score(fit) <= DISAGREEMENT)
+        return _untold(videos, fit if score(fit) <= DISAGREEMENT else None)
     together, rate_errors = covariance(fit), np.zeros(len(lags))
     drifting = fit.errors[:, DRIFT] > 0
     rate_errors[drifting] = np.sqrt(np.diag(together)[count:]) / fit.footage.span
@@ -411,15 +412,19 @@ def _told(videos: _Videos, fit: Adjustment) -> Lags:
     )
 
 
-def _untold(videos: _Videos, agree: bool) -> Lags:
-    """Lags of which the tracks tell nothing, as all agree or none; the first one is the clock."""
+def _untold(videos: _Videos, fit: Adjustment | None = None) -> Lags:
+    """Lags of which the tracks tell nothing: whole ones near a fit that agrees, if one does.
+
+    The first one is the clock.
+    """
     lags, residual = videos.given.lags, np.inf
     errors = np.where(np.arange(len(lags)) > 0, np.inf, 0.0)
-    cameras = videos.cameras(videos.given)
-    if cameras is not None:
+    if fit is not None:
+        lags, residual = np.rint(fit.footage.lags) + 0.0, fit.left()  # and not -0
+    elif (cameras := videos.cameras(videos.given)) is not None:
         residual = max(map(trimmed, missed(cameras, videos.given.aligned)))
     warnings = [_blurred(i, lags) for i in range(1, len(lags))]
-    if not agree:
+    if fit is None:
         left = f"leave {residual:.2g} pixels" if residual < np.inf else "no cameras fit"
         warnings = [
             f"no lags of the videos make the views agree: ({list_lags(lags)}) frames were taken, "
