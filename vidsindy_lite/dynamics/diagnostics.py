@@ -788,6 +788,16 @@ def _sampling(problem: Problem, fit: Fit, law: PolynomialSystem, remedy: str) ->
             f"the motion is taken to have process noise, which {few} cannot tell from a drive or a "
             f"force that nobody named: {'sample faster' if coarse else 'record longer'}, or name it"
         )
+    segments, count = fit.collocation.segments, len(fit.collocation.grid.x)
+    span = sum(np.ptp(segment.breakpoints) for segment in segments)
+    # The curve is smooth where kicks are not: along it, no damping is seen of what they balance.
+    kicked = (problem.process_noise * span) ** 2 / count > 4 * x.var(axis=0)
+    if kicked.any():
+        names = " and ".join(np.array(law.names)[kicked])
+        yield (
+            f"process noise alone would carry {names} further in the time of the record than it "
+            "moves: what damps or drives it by less than that noise is not seen, and may be missing"
+        )
     # A body without a force moves evenly.
     for j in np.flatnonzero(~law.support.any(axis=0) & (law.order == 1)).tolist():
         name = law.names[j]

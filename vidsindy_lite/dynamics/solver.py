@@ -206,11 +206,11 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     drowned = problem.noise.max() > 0.5  # a curve shows no accelerations
     if swing or order == 2 or drowned:
         return replace(found, swing=swing)
-    # With inputs a place is passed with several velocities, whatever the order is.
-    if not (found.system.timed or accelerated(problem.curves)):
-        return found
     whole, second = task.library.degree, None
-    for degree in [1, whole] if whole and whole > 1 else [whole]:  # linear forces come first
+    # Linear forces come first, and others where the curves look like theirs: with inputs a place
+    # is passed with several velocities, whatever the order is.
+    others = found.system.timed or accelerated(problem.curves)
+    for degree in [1] * bool(whole) + [whole] * (others and whole != 1):
         simple = replace(task, library=replace(task.library, degree=degree))
         try:
             second, *_ = _solved(simple, simple.form(2))
