@@ -155,6 +155,12 @@ def test_what_cannot_be_of_second_order_stays_with_the_first():
     assert discover(t, x, library=Library.polynomial(3).where({"x": {"1": 0.0}})).system.order == 1
 
 
+def test_a_fall_is_of_second_order_though_it_passes_no_place_twice():
+    t = np.linspace(0, 1, 60)
+    found = discover(t, noisy(9.81 * t[:, None] ** 2 / 2, 0.005))
+    assert found_terms(found.system) == {("vx", "1"): pytest.approx(9.81, abs=0.1)}
+
+
 def test_which_of_two_laws_is_better():
     t = np.linspace(0, 20, 300)
     second = discover(t, moving(duffing, [1.5], [0.0], t), order=2)

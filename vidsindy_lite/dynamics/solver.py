@@ -28,6 +28,7 @@ from .collocation import Fit
 from .data import Trajectory, check_sigma, check_systematic, check_trajectories, coordinate_names
 from .diagnostics import diagnose, is_on_circle
 from .inference import infer, with_errors
+from .l0 import STRONG
 from .library import Library, check_library, monomial_exponents, monomials
 from .mechanics import NAME
 from .model import Form
@@ -199,18 +200,29 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     """The law of an order, or of the one that is to be trusted."""
     if order == "auto" and task.library.moving(task.names):
         order = 2  # who names a velocity means a law of motion
-    found, problem, _ = _solved(task, task.form(2 if order == 2 else 1))
-    if order == 1 or task.library.given or not found.warnings:
+    found, problem, fit = _solved(task, task.form(2 if order == 2 else 1))
+    if order == 1 or task.library.given:
+        return found
+    if order == "auto" and fit.state.active[1:].any() and len(task.names) == 1:
+        # What only rises or falls on a line passes no place twice, and may be pulled steadily.
+        constant = replace(task, library=Library.polynomial(0))
+        steady, exact, its = _solved(constant, constant.form(2))
+        less = information_criterion(problem, fit) - information_criterion(exact, its)
+        if less > STRONG and not exact.has_process_noise:
+            return replace(
+                steady, note=f"order 2: a constant force costs {less:.3g} less than order 1"
+            )
+    if not found.warnings:
         return found
     swing = _swing(task, problem, order == 2)
     drowned = problem.noise.max() > 0.5  # a curve shows no accelerations
     if swing or order == 2 or drowned:
         return replace(found, swing=swing)
+    # With inputs a place is passed with several velocities, whatever the order is.
+    if not (found.system.timed or accelerated(problem.curves)):
+        return found
     whole, second = task.library.degree, None
-    # Linear forces come first, and others where the curves look like theirs: with inputs a place
-    # is passed with several velocities, whatever the order is.
-    others = found.system.timed or accelerated(problem.curves)
-    for degree in [1] * bool(whole) + [whole] * (others and whole != 1):
+    for degree in [1, whole] if whole and whole > 1 else [whole]:  # linear forces come first
         simple = replace(task, library=replace(task.library, degree=degree))
         try:
             second, *_ = _solved(simple, simple.form(2))
