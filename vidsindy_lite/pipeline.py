@@ -792,6 +792,8 @@ def _with_law(seen: Observation, names: Sequence[str], law: dict[str, Any]) -> V
         x, modes, circle = seen.x[:, moves], seen.systematic[..., moves], None
         if default and seen.targets == 1:
             found, circle = simplest(seen.t, x, modes, modes, law, STILL)
+        elif seen.targets == 1 and law["library"] is None:
+            found = _where_it_moves(seen.t, x, modes, law, STILL)
         else:
             found = dynamics.discover(seen.t, x, systematic=modes, **law)
     axes = np.eye(len(moves))[moves]
@@ -834,19 +836,31 @@ def simplest(
     flight = dynamics.homogeneous(t[rows], x[rows], names, modes[:, rows])
     if flight is not None:
         return flight, None
-    axes = directions(t[rows], x[rows], most)
-    bound = {"degree": 1, "order": 2} if len(axes) < 3 else {}
-    found = dynamics.discover(t, x @ axes.T, systematic=told @ axes.T, **law | bound)
+    found = _where_it_moves(t, x, told, law, most, degree=1, order=2)
     swing = found.swing
     if swing is None:
-        turned = not np.array_equal(axes, np.eye(x.shape[1]))
-        return (replace(found, orientation=axes) if turned else found), None
+        return found, None
+    axes = np.eye(x.shape[1]) if found.orientation is None else found.orientation
     circle = dynamics.on_circle(x, swing.circle.axes[0] @ axes, modes)
     found, names = swing.law, swing.law.system.names[:1]
     angle, shared = circle.angle[rows, None], np.asarray(circle.systematic)[:, rows]
     turning = dynamics.homogeneous(t[rows], angle, names, shared)
     found = found if turning is None or turning.warnings else turning
     return replace(found, warnings=(*circle.warnings, *found.warnings)), circle
+
+
+def _where_it_moves(
+    t: Floats, x: Floats, modes: Floats, law: dict[str, Any], most: float, **bound: int
+) -> Discovery:
+    """The law along the `directions` in which a path moves; ``bound`` holds of one or two."""
+    rows = np.isfinite(x).all(axis=1)
+    axes = directions(t[rows], x[rows], most)
+    asked = law | (bound if len(axes) < 3 else {})
+    found = dynamics.discover(t, x @ axes.T, systematic=modes @ axes.T, **asked)
+    if np.array_equal(axes, np.eye(x.shape[1])):
+        return found
+    own = np.eye(len(axes)) if found.orientation is None else found.orientation
+    return replace(found, orientation=own @ axes)
 
 
 def directions(t: Floats, x: Floats, most: float) -> Floats:
