@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import qr
 
 from . import cameras, dynamics, vision
-from .arrays import Bools, Floats
+from .arrays import Bools, Floats, Ints
 from .cameras import Clock, Footage, Lags, Rig
 from .checks import (
     check_choice,
@@ -38,6 +38,7 @@ from .vision import Hint, TrackFile
 
 _OTHER_LAG = 0.02  # frames by which it may differ without a word
 _SMOOTHED = 8  # frames of a stretch, from which its curve can be told from noise
+_WILD = 8.0  # medians of what places miss their neighbours by; and a single one does
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
 
 
@@ -244,11 +245,15 @@ def observe_tracks(
                 f"tracks: must be in pixels, got {name} with all places between -1 and 1: if they "
                 f"are shares of the image multiply them by its size, {camera.image_size}"
             )
+    cleared = [without_wild(*each) for each in zip(raw, names, strict=True)]
+    raw, said = [track for track, _ in cleared], [left_out for _, left_out in cleared]
     if isinstance(lags, str):
         check_choice("lags", lags, ["synchronous"])
-        return _observed(raw, rig, clock, np.zeros(len(raw)), names, synchronous=True)
-    given = _check_lags(lags, clock, names)
-    return _observed(raw, rig, clock, given, names, progress=progress)
+        found = _observed(raw, rig, clock, np.zeros(len(raw)), names, synchronous=True)
+    else:
+        given = _check_lags(lags, clock, names)
+        found = _observed(raw, rig, clock, given, names, progress=progress)
+    return replace(found, rig=noted(found.rig, *said))
 
 
 def _observed(
@@ -436,6 +441,52 @@ def tracked(
             "header wrong"
         )
     return found
+
+
+def noted(rig: Rig, *more: str) -> Rig:
+    """The rig with more in its note."""
+    return replace(rig, note="; ".join(filter(None, (rig.note, *more))))
+
+
+def without_wild(track: Floats, name: str) -> tuple[Floats, str]:
+    """A track, (n, 2), without single places that are far from a smooth path; and which these were.
+
+    Without such a place those beside it are on one path, as they are not where a target bounces.
+    """
+    seen = np.flatnonzero(np.isfinite(track).all(axis=1))
+    kept, far, most = seen, list[int](), len(seen) // 10
+    limit = max(_WILD * float(np.median(_missed(seen, track))), cameras.GROSS) if most else np.inf
+    while (apart := _missed(kept, track)).max(initial=0.0) > limit and len(far) <= most:
+        far, kept = [*far, int(kept[apart.argmax()])], np.delete(kept, apart.argmax())
+    order = np.sort(np.searchsorted(seen, far)) if len(far) <= most else np.zeros(0, dtype=int)
+    gaps, wild = np.diff(order, prepend=-2, append=len(seen) + 1), []
+    for row in seen[order[(gaps[:-1] > 1) & (gaps[1:] > 1)]].tolist():
+        near = np.sort(kept[np.argsort(np.abs(kept - row))[:10]])
+        back = np.sort(np.append(near, row))
+        own = _missed(back, track)[np.searchsorted(back, row)]
+        if own > 5 * _missed(near, track).max():
+            wild.append(row)
+    cleared = track.copy()
+    cleared[wild] = np.nan
+    frames = ", ".join(map(str, wild[:5])) + (", ..." if len(wild) > 5 else "")
+    return (
+        cleared,
+        f"left out of {name}, far from their neighbours: frames {frames}" if wild else "",
+    )
+
+
+def _missed(rows: Ints, track: Floats) -> Floats:
+    """By how much places of a track miss the cubic through the four beside each, over its noise."""
+    t, x = rows, track[rows]
+    if len(t) < 5:
+        return np.zeros(len(t))
+    own = np.arange(len(t))[:, None]
+    window = np.clip(own - 2, 0, len(t) - 5) + np.arange(5)
+    beside = window[window != own].reshape(-1, 4)
+    away, between = t[beside] - t[own], t[beside][:, :, None] - t[beside][:, None]
+    weights = np.prod(away, axis=1, keepdims=True) / away / np.prod(between + np.eye(4), axis=2)
+    missed = x + np.einsum("nj,nji->ni", weights, x[beside])
+    return np.linalg.norm(missed, axis=1) / np.sqrt(1 + (weights**2).sum(axis=1))
 
 
 def check_found(tracks: Sequence[Floats], names: Sequence[str], targets: int) -> None:

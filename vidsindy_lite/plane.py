@@ -24,10 +24,12 @@ from .pipeline import (
     check_found,
     directions,
     law_options,
+    noted,
     refusing,
     simplest,
     times_of,
     tracked,
+    without_wild,
 )
 from .vision import Hint, check_detector, frame_clock, read_tracks, video_info
 
@@ -197,6 +199,8 @@ def discover_from_video(
     if frames is not None:
         pixels = _between(frames, pixels, first)
     check_found([pixels], [name], 1)
+    pixels, left_out = without_wild(pixels, name)
+    rig = noted(rig, left_out)
     x = mapped(to_plane, pixels)
     known = slice(3 if corners is None else 1) if measured else slice(0)
     modes = np.stack([error * x, *_tilts(camera, pixels, middle)])[known]
@@ -218,7 +222,7 @@ def discover_from_video(
         borne = (
             f"{found.leaning:.0f} degrees off the vertical: something bears it, its pull is no g"
         )
-        found = replace(found, rig=replace(rig, note=f"{rig.note}; along a line {borne}"))
+        found = replace(found, rig=noted(rig, f"along a line {borne}"))
     contradicted = _contradicted(found, up is not None or corners is not None, corners is None)
     if law.warnings and frames is None:
         contradicted.append(
