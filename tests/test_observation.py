@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from helpers import by_hand, room
 from hypothesis import given
 from hypothesis import strategies as st
 
 import vidsindy_lite as vl
 from vidsindy_lite import cameras, study
-from vidsindy_lite.pipeline import Refused, refusing
+from vidsindy_lite.pipeline import Refused, refusing, without_wild
 
 
 @pytest.fixture(scope="module")
@@ -46,15 +47,76 @@ def test_a_view_along_the_motion_helps_though_its_lag_is_not_told():
     np.testing.assert_allclose(law.fitted, x, atol=1e-6)  # along z, whatever its law calls that
 
 
+def before_three_cameras(x, noise=0.3):
+    """The tracks of a path, with noise, and a rig around it."""
+    rng, rig = np.random.default_rng(0), vl.Rig.around(x)
+    return [c.project(x) + noise * rng.normal(size=(len(x), 2)) for c in rig.cameras], rig
+
+
+def thrown(t):
+    return np.outer(t, (1.5, 0.4, 5)) - np.outer(4.905 * t**2, (0, 0, 1))
+
+
 def test_a_throw_before_three_cameras_has_the_law_of_its_flight():
-    t, rng = np.arange(40) / 30, np.random.default_rng(0)
-    x = np.outer(t, (1.5, 0.4, 5)) - np.outer(4.905 * t**2, (0, 0, 1))
-    rig = vl.Rig.around(x)
-    tracks = [camera.project(x) + 0.3 * rng.normal(size=(40, 2)) for camera in rig.cameras]
-    found = vl.discover_from_tracks(tracks, rig, t)
+    t = np.arange(40) / 30
+    tracks, rig = before_three_cameras(thrown(t))
+    for wild in ([], [7, 20]):
+        tracks[1][wild] += 60
+        found = vl.discover_from_tracks(tracks, rig, t)
+        assert found.status == "ok"
+        assert abs(found.g.value - 9.81) < 3 * found.g.error < 0.1
+        np.testing.assert_allclose(found.fitted, thrown(t), atol=0.01)
+        assert ("tracks[1], far from their neighbours: frames 7, 20" in str(found)) == bool(wild)
+
+
+def test_the_tilt_of_a_rig_measured_by_hand_is_no_force():
+    rng, t = np.random.default_rng([2, 17]), np.arange(30) / 30
+    rig, x = room(rng), thrown(t) - [0.7, 0, 0.5]
+    tracks = [c.project(x) + 0.5 * rng.normal(size=(30, 2)) for c in rig.cameras]
+    found = vl.discover_from_tracks(tracks, by_hand(rng, rig), t, lags="synchronous")
     assert found.status == "ok"
-    assert abs(found.g.value - 9.81) < 3 * found.g.error < 0.1
-    np.testing.assert_allclose(found.fitted, x, atol=0.01)
+    assert found.discovery.system.support.sum() == 3 + 1
+    assert abs(found.g.value - 9.81) < 3 * found.g.error
+
+
+@pytest.mark.parametrize(
+    ("angle", "term", "pull"),
+    [(lambda t: 6 * t - 0.25 * t**2, "1", 0.5), (lambda t: 0.6 * np.cos(4 * t), "angle", 16.0)],
+)
+def test_what_is_on_a_circle_before_three_cameras_has_the_law_of_its_angle(angle, term, pull):
+    t = np.arange(150) / 30
+    aside, down = np.array([0.8, 0.6, 0]), np.array([0, 0, -1.0])
+    x = 0.5 * (np.outer(np.sin(angle(t)), aside) + np.outer(np.cos(angle(t)), down))
+    found = vl.discover_from_tracks(*before_three_cameras(x), t, lags="synchronous")
+    law = found.discovery
+    assert abs(found.circle.radius - 0.5) < 4 * found.circle.radius_error
+    assert [law.terms[row] for row in np.flatnonzero(law.system.support[:, 1])] == [term]
+    assert abs(law.coefficients[law.terms.index(term), 1]) == pytest.approx(pull, rel=0.02)
+    np.testing.assert_allclose(found.fitted, x, atol=2e-3)
+    assert f"{found}".startswith("on a circle of radius 0.5")
+    assert found.status == "ok"
+
+
+@pytest.mark.parametrize("order", ["auto", 2])
+def test_what_is_bound_to_a_plane_has_its_law_there(order):
+    t, aslant = np.arange(240) / 30, np.array([0.6, 0, 0.8])
+    x = np.outer(0.3 * np.cos(4 * t), aslant) + np.outer(0.2 * np.sin(5.3 * t), (0, 1, 0))
+    found = vl.discover_from_tracks(*before_three_cameras(x), t, lags="synchronous", order=order)
+    assert found.status == "ok"
+    said = found.discovery.physics()
+    pulls = [float(said[f"spring constant {axis}"].value) for axis in "xy"]
+    np.testing.assert_allclose(sorted(pulls), [16, 28.09], rtol=0.01)
+    np.testing.assert_allclose(found.fitted, x, atol=5e-3)
+
+
+@given(st.floats(0.5, 30), st.integers(5, 40), st.integers(0, 9))
+def test_where_a_target_bounces_nothing_is_wild(speed, period, seed):
+    n = np.arange(90)
+    track = np.column_stack([3.0 * n, speed * np.abs(n % (2 * period) - period)])
+    track += np.random.default_rng(seed).normal(size=track.shape)
+    cleared, said = without_wild(track, "a")
+    np.testing.assert_array_equal(cleared, track)
+    assert said == ""
 
 
 def test_given_lags_that_are_off_by_a_fraction_are_told(case):

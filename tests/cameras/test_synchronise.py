@@ -146,6 +146,21 @@ def test_a_target_that_hardly_moves_tells_no_lag():
     assert all("the target moves too little or too slowly" in w for w in found.warnings)
 
 
+def test_a_loose_rig_that_tells_no_lags_takes_no_place_of_one_that_agrees():
+    rng = np.random.default_rng(1)
+    rig = room(rng)
+
+    def thrown(frames):
+        t = np.asarray(frames)[:, None] / 60 - 0.4
+        return t * [1.5, 0.2, 0] - 4.905 * t**2 * [0, 0, 1] + [0, 0, 0.4]
+
+    late = np.array([0, 12, -9])
+    exact = learn_lags(shot(rng, rig, np.arange(48), late, path=thrown), rig)
+    np.testing.assert_allclose(exact.frames, late, atol=0.1)
+    loose = learn_lags(shot(rng, rig, np.arange(48), late, path=thrown), by_hand(rng, rig))
+    np.testing.assert_allclose(loose.frames, late, atol=3)
+
+
 def test_lags_that_are_given_are_the_start(motion):
     tracks = filmed(motion, (150,) * 3, (0, 7, 0))
     rig = motion[1].uncalibrated()
