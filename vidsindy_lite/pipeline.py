@@ -926,10 +926,12 @@ def directions(t: Floats, x: Floats, most: float) -> Floats:
         return np.asarray(spread > np.maximum(most * noise, 1e-9 * spread.max()))
 
     axes = np.eye(x.shape[1])
+    if not moves(axes).any():  # all of it is noise
+        return axes
     axes = axes[moves(axes)]
     _, _, own = np.linalg.svd((x - x.mean(axis=0)) @ axes.T, full_matrices=False)
     own = own[moves(own @ axes)]
-    if len(own) == len(axes):
+    if len(own) in (0, len(axes)):
         return axes
     nearest = np.sort(qr(own, pivoting=True)[2][: len(own)])
     u, _, v = np.linalg.svd(own[:, nearest])

@@ -116,6 +116,14 @@ def test_law_of_a_kicked_motion_is_found_with_the_size_of_its_kicks():
     assert "process noise: 0.0" in str(found)
 
 
+def test_that_damping_is_hidden_by_the_kicks_that_balance_it_is_told():
+    rates = {"x": {"x": -0.6, "y": 2.0}, "y": {"x": -2.0, "y": -0.6}}
+    law, rng = PolynomialSystem.from_terms(rates), np.random.default_rng(0)
+    t = np.linspace(0, 30, 600)
+    found = vl.discover(t, kicked_path(law, t, (1.0, 0.0), (0.3, 0.3), rng), degree=1)
+    assert any("would carry x and y further" in warning for warning in found.warnings)
+
+
 @pytest.mark.parametrize("kind", ["independent", "lasting", "bent space"])
 def test_errors_of_the_measurement_are_no_kicks(kind):
     rng = np.random.default_rng(5)

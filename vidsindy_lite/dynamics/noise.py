@@ -135,9 +135,9 @@ def independent(errors: Floats) -> float:
     """How many independent errors have a variance as uncertain as that of these, (n,).
 
     Their number over the sum of the squared autocorrelations (Bartlett 1946), which is that of the
-    ordinates of their periodogram that matter: few, if they have periods.
+    ordinates of their periodogram that matter: few, if they have periods or stay aside.
     """
-    powers = np.abs(np.fft.rfft(errors, max(len(errors), 1))[1:]) ** 2
+    powers = np.abs(np.fft.rfft(errors, max(len(errors), 1))) ** 2
     return float(4 * powers.sum() ** 2 / (powers**2).sum()) if powers.any() else 0.0
 
 

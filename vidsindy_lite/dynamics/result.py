@@ -622,15 +622,16 @@ def swinging(
     """
     x = np.concatenate([values for _, values in runs])
     modes = np.moveaxis(np.concatenate(list(shared)), -1, 0)
-    own, zero = on_circle(x).centre_covariance, None
-    for _ in range(3):  # each law tells better where the angle is zero
+    own, zero, found = on_circle(x).centre_covariance, None, list[Swing]()
+    for _ in range(3):  # each law tells better where the angle is zero, or is none
         circle = on_circle(x, zero, modes)
-        law = solve(*_samples(circle, own, runs))
-        rest = _rest(law)
+        found.append(Swing(circle, solve(*_samples(circle, own, runs))))
+        rest = _rest(found[-1].law)
         if not rest:
             break
         zero = np.array([np.cos(rest), np.sin(rest)]) @ circle.axes
-    return Swing(circle, law)
+    least = min(swing.law.noise[0] for swing in found)
+    return [swing for swing in found if swing.law.noise[0] <= 1.5 * least][-1]
 
 
 def _samples(
