@@ -249,8 +249,8 @@ def test_a_wheel_turns_by_the_law_of_its_angle(monkeypatch):
         assert (found.status, found.g, "".join(told)) == ("ok", None, term)
     turned = 0.4 * np.column_stack([np.cos(100 * t), np.sin(100 * t)])  # nearly half a turn a frame
     filmed(monkeypatch, pixels_of(noisy(turned, 0)))
-    doubt, *_ = vl.discover_from_video("wheel.mp4", STICK).warnings
-    assert doubt.startswith("only 2.1 samples per turn")
+    doubts = vl.discover_from_video("wheel.mp4", STICK).warnings
+    assert any("only 2.1 samples per turn" in doubt for doubt in doubts)
 
 
 def test_a_wrong_length_and_a_wrong_vertical_are_told(monkeypatch):
