@@ -38,7 +38,7 @@ from .vision import Hint, TrackFile
 
 _OTHER_LAG = 0.02  # frames by which it may differ without a word
 _SMOOTHED = 8  # frames of a stretch, from which its curve can be told from noise
-_WILD = 8.0  # medians of what places miss their neighbours by; and a single one does
+_WILD = 8.0  # medians of what places miss their neighbours by, from which on one is no motion
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
 
 
@@ -469,10 +469,8 @@ def without_wild(track: Floats, name: str) -> tuple[Floats, str]:
     cleared = track.copy()
     cleared[wild] = np.nan
     frames = ", ".join(map(str, wild[:5])) + (", ..." if len(wild) > 5 else "")
-    return (
-        cleared,
-        f"left out of {name}, far from their neighbours: frames {frames}" if wild else "",
-    )
+    said = f"left out of {name}, far from their neighbours: frames {frames}"
+    return cleared, said if wild else ""
 
 
 def _missed(rows: Ints, track: Floats) -> Floats:
