@@ -9,14 +9,8 @@ import pytest
 from PIL import Image
 
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.companion.compare import (
-    differences,
-    outdated,
-    replace,
-    same_notebook,
-    same_text,
-    write_differences,
-)
+from vidsindy_lite.companion import compare
+from vidsindy_lite.companion.compare import differences, same_notebook, same_text, write_differences
 
 COMMON = {"notebook": "01_first", "caption": "A."}
 RECORD = COMMON | {"id": "table_1", "kind": "table"}
@@ -98,8 +92,8 @@ def test_what_is_on_one_side_only(folders, content):
 
 def refresh(committed, regenerated, notebook):
     """Put what is outdated in place, and say what it was."""
-    names = outdated(committed, regenerated, notebook)
-    replace(committed, regenerated, names)
+    names = compare.outdated(committed, regenerated, notebook)
+    compare.replace(committed, regenerated, names)
     return names
 
 

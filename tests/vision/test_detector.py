@@ -10,17 +10,10 @@ from hypothesis import strategies as st
 from tiny_onnx import BOX, write_red_detector
 
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.vision import network
+from vidsindy_lite.vision import WEIGHTS, LearnedDetector, check_detector, detections, network
 from vidsindy_lite.vision.network import Network, anchors
 from vidsindy_lite.vision.rendering import BACKGROUNDS, SHAPES, Scene, render
-from vidsindy_lite.vision.tracking import (
-    LEAST,
-    WEIGHTS,
-    LearnedDetector,
-    OnnxDetector,
-    check_detector,
-    detections,
-)
+from vidsindy_lite.vision.tracking import LEAST, OnnxDetector
 
 LOG = json.loads(WEIGHTS.with_suffix(".json").read_text())
 
