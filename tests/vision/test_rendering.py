@@ -173,24 +173,13 @@ def test_of_several_targets_the_later_ones_are_in_front():
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("background", "moon"),
-        ("shape", "cube"),
-        ("colour", "teal"),
-        ("size", 2),
-        ("turns", np.inf),
-        ("tumbling", -1),
-        ("size_variation", 0.9),
-        ("noise_variance", -0.1),
-        ("shape_seed", -1),
-        ("turns", "many"),
-        ("image_size", (10, 10)),
-        ("occluders", ((1, 2, 3),)),
-        ("occluders", ((0, 1, 4, 512),)),
-        ("occluders", ((-1, 0, 9, 9),)),
-        ("trees", ((1, 2, 3),)),
-        ("trees", ((0, 500, 50, 50),)),
+        ("background", "moon"), ("shape", "cube"), ("colour", "teal"), ("size", 2),
+        ("turns", np.inf), ("turns", "many"), ("tumbling", -1), ("size_variation", 0.9),
+        ("noise_variance", -0.1), ("shape_seed", -1), ("image_size", (10, 10)),
+        *[("occluders", (box,)) for box in ((1, 2, 3), (0, 1, 4, 512), (-1, 0, 9, 9))],
+        *[("trees", (box,)) for box in ((1, 2, 3), (0, 500, 50, 50))],
     ],
-)
+)  # fmt: skip
 def test_scene_rejects(field, value):
     with pytest.raises(ValueError, match=f"^{field}: must|^{field}: each must"):
         Scene(**{field: value})
