@@ -111,14 +111,9 @@ def test_bad_onnx_files(tmp_path):
         thin.predict(np.zeros((64, 64, 3), np.uint8))
 
 
-@pytest.fixture
-def small(monkeypatch):
-    """Training that takes seconds."""
-    monkeypatch.setattr(network, "BATCH", 2)
+def test_a_training_again_gives_the_same_weights_and_log(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(network, "BATCH", 2)  # it takes seconds
     monkeypatch.setattr(network, "_EACH", 1)
-
-
-def test_a_training_again_gives_the_same_weights_and_log(small, tmp_path, capsys):
     log = network.train(tmp_path / "one.pt", seed=3, steps=2)
     command = ["train-detector", "--seed", "3", "--steps", "2", "--output"]
     assert main([*command, str(tmp_path / "other.pt")]) == 0

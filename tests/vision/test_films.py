@@ -183,22 +183,6 @@ def test_what_is_hidden_altogether_stays_a_gap(tmp_path):
     assert np.nanmax(error) < 3
 
 
-def beach_ball(folder, radius, rate, colours, flicker):
-    """A ball of two halves that turns by `rate` radians a frame, before bricks."""
-    half = cv2.ellipse2Poly((0, 0), (1000, 1000), 0, 0, 180, 4) / 1000 * radius
-
-    def draw(image, i):
-        at = np.rint(16 * places()[i]).astype(int)
-        for colour, first in zip(colours, (0, np.pi), strict=True):
-            angle = rate * i + first
-            spin = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-            corners = np.rint(16 * (half @ spin) + at).astype(np.int32)
-            cv2.fillConvexPoly(image, corners, colour, cv2.LINE_AA, 4)
-        return (1 + flicker * np.sin(1.7 * i)) * image
-
-    return painted(folder, BRICKS, draw, LENGTH, 1.5)
-
-
 @pytest.mark.parametrize(
     ("colours", "rate", "flicker"),
     [
@@ -207,7 +191,18 @@ def beach_ball(folder, radius, rate, colours, flicker):
     ],
 )
 def test_a_ball_of_two_halves_that_turns(tmp_path, colours, rate, flicker):
-    path = beach_ball(tmp_path, 12, rate, colours, flicker)
+    half = cv2.ellipse2Poly((0, 0), (1000, 1000), 0, 0, 180, 4) / 1000 * 12
+
+    def draw(image, i):
+        at = np.rint(16 * places()[i]).astype(int)
+        for colour, first in zip(colours, (0, np.pi), strict=True):
+            angle = rate * i + first  # radians
+            spin = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+            corners = np.rint(16 * (half @ spin) + at).astype(np.int32)
+            cv2.fillConvexPoly(image, corners, colour, cv2.LINE_AA, 4)
+        return (1 + flicker * np.sin(1.7 * i)) * image
+
+    path = painted(tmp_path, BRICKS, draw, LENGTH, 1.5)
     _, error = followed(path, places(), least=0.8)
     assert np.nanpercentile(error, 90) < 1
 

@@ -423,13 +423,9 @@ def test_what_phones_code_is_read_in_eight_bits(tmp_path, name, codec, pixels):
         assert np.abs(ours.astype(int) - true).mean() < 4
 
 
-FIELDS = (160, 120)
-INTERLACED = {"x264-params": "interlaced=1:tff=1", "crf": "6"}
-
-
 def interlaced(path, track, **options):
     """A film with two views a frame: the upper lines of one, the lower of the next."""
-    views = list(render(track, vl.Scene("plain", size=14, image_size=FIELDS)))
+    views = list(render(track, vl.Scene("plain", size=14, image_size=(160, 120))))
     frames = [view.copy() for view in views[::2]]
     for frame, later in zip(frames, views[1::2], strict=True):
         frame[1::2] = later[1::2]
@@ -440,7 +436,7 @@ def interlaced(path, track, **options):
 def test_the_target_is_where_it_was_at_one_instant(tmp_path):
     along = np.linspace(0, 2 * np.pi, 120)
     track = np.column_stack((80 + 45 * np.cos(along), 60 + 35 * np.sin(2 * along)))
-    path = interlaced(tmp_path / "a.mp4", track, **INTERLACED)
+    path = interlaced(tmp_path / "a.mp4", track, crf="6", **{"x264-params": "interlaced=1:tff=1"})
     assert np.array_equal(read_frame(path, 19), list(read_video(path))[19])
     found = vl.track(path).pixels
     seen = np.isfinite(found).all(axis=1)
