@@ -109,11 +109,9 @@ def test_paths_have_nothing_in_common_and_the_plainest_comes_first():
 def test_what_stays_in_its_place_or_changes_its_outline_is_less_plain():
     plain = one_a_frame(CURVE, np.full(30, 0.9))
     stays = one_a_frame(20 + 0.02 * CURVE, np.full(30, 0.9))
-    box = plain.box.copy()
-    box[::2, 2] += 6  # of 9 pixels, in each frame: somebody who walks
-    best, *others = (
-        plainest_paths(seen)[0].rating for seen in (plain, stays, plain._replace(box=box))
-    )
+    walks = plain._replace(box=plain.box.copy())
+    walks.box[::2, 2] += 6  # of 9 pixels, in each other frame
+    best, *others = (plainest_paths(seen)[0].rating for seen in (plain, stays, walks))
     assert max(others) < 0.5 * best
 
 

@@ -122,10 +122,8 @@ def test_views_of_another_size_than_those_around_them_do_not_fit():
 
 @pytest.mark.parametrize("noise", [0.0, 0.02, 0.2])
 def test_the_rougher_a_path_the_more_may_outlines_differ(noise):
-    rng = np.random.default_rng(0)
-    way = np.column_stack([3.0 * SIXTY, 50 + 20 * np.sin(SIXTY / 9)]) + rng.normal(
-        0, noise, (60, 2)
-    )
+    way = np.column_stack([3.0 * SIXTY, 50 + 20 * np.sin(SIXTY / 9)])
+    way += np.random.default_rng(0).normal(0, noise, way.shape)
     skewness = np.zeros((60, 2))
     skewness[20:26] = 0.1  # of a target of 20 pixels
     areas, inside = np.full(60, 400.0), np.full(60, True)

@@ -112,10 +112,8 @@ def test_reading_rejects(tmp_path, capfd, read):
     with pytest.raises(ValueError, match="path: must be a video file that PyAV can read"):
         read(text)
     headers = tmp_path / "headers.avi"
-    writer = cv2.VideoWriter(
-        str(headers), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"MJPG"), 25, (64, 64)
-    )
-    writer.release()
+    fourcc = cv2.VideoWriter_fourcc(*"MJPG")
+    cv2.VideoWriter(str(headers), cv2.CAP_FFMPEG, fourcc, 25, (64, 64)).release()
     with pytest.raises(ValueError, match=f"path: must .* '{headers}'"):
         read(headers)
     with wave.open(str(tmp_path / "sound.wav"), "wb") as sound:
@@ -522,9 +520,8 @@ def pages(dtype, shift=0):
     """A bright disc that goes to and fro, 40 images."""
     for k in range(40):
         page = np.full((60, 80), 90, np.uint8)
-        cv2.circle(
-            page, (round(40 + 25 * np.cos(k / 5)), round(30 + 17 * np.sin(k / 5))), 5, 230, -1
-        )
+        u, v = 40 + 25 * np.cos(k / 5), 30 + 17 * np.sin(k / 5)
+        cv2.circle(page, (round(u), round(v)), 5, 230, -1)
         yield page.astype(dtype) << shift
 
 
