@@ -165,30 +165,19 @@ READERS = {
 }  # fmt: skip
 
 
-def often(examples):
-    return settings(max_examples=examples, suppress_health_check=list(HealthCheck))
-
-
-def check(name, folder, data):
+@pytest.mark.parametrize("name", [*RIGHT, *METHODS, *READERS])
+@pytest.mark.parametrize("examples", [12, pytest.param(150, marks=pytest.mark.thorough)])
+def test_odd_ones(name, examples, tmp_path):
     """A call with odd arguments, or a file of odd content."""
-    if name in READERS:
-        read, contents = READERS[name]
-        (folder / name).write_bytes(data.draw(contents))
-        clear(read, folder / name)
-    else:
-        tried(*(METHODS.get(name) or (getattr(vl, name), RIGHT[name]())), data.draw)
 
+    @settings(max_examples=examples, suppress_health_check=list(HealthCheck))
+    @given(data=st.data())
+    def check(data):
+        if name in READERS:
+            read, contents = READERS[name]
+            (tmp_path / name).write_bytes(data.draw(contents))
+            clear(read, tmp_path / name)
+        else:
+            tried(*(METHODS.get(name) or (getattr(vl, name), RIGHT[name]())), data.draw)
 
-@pytest.mark.parametrize("name", [*RIGHT, *METHODS, *READERS])
-@often(12)
-@given(data=st.data())
-def test_odd_ones(name, tmp_path_factory, data):
-    check(name, tmp_path_factory.getbasetemp(), data)
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("name", [*RIGHT, *METHODS, *READERS])
-@often(150)
-@given(data=st.data())
-def test_many_odd_ones(name, tmp_path_factory, data):
-    check(name, tmp_path_factory.getbasetemp(), data)
+    check()

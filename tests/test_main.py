@@ -126,9 +126,7 @@ def test_a_refusal_has_one_line_and_a_picture(tracked, capsys):
     assert "x: must hold at least as many samples as unknowns" in line
     assert "; likely causes, in this order: the rig, the lags, the tracker; " in line
     assert line.endswith("; the tracks are drawn in report/report.html")
-    assert {path.name for path in (tracked / "report").iterdir()} == {
-        "report.html", "result.json", "tracks.csv",
-    }  # fmt: skip
+    assert sorted(os.listdir("report")) == ["report.html", "result.json", "tracks.csv"]
     # Frames of files count from the start of their videos; a report takes the place of that.
     for name, cut in (("a", 5), ("b", 9)):
         header, *rows = (tracked / f"{name}.csv").read_text().split("\n")

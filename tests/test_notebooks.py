@@ -13,14 +13,8 @@ from disturbed.undisplayed import FigureCanvas
 from helpers import run_quickly
 from matplotlib.figure import Figure
 
-from vidsindy_lite.companion.artifacts import (
-    INDEX,
-    files_of,
-    read_records,
-    save_figure,
-    save_table,
-    write_index,
-)
+from vidsindy_lite.companion import artifacts
+from vidsindy_lite.companion.artifacts import read_records
 from vidsindy_lite.companion.compare import differences
 from vidsindy_lite.companion.run import find_notebooks, tidy
 from vidsindy_lite.storage import PACKAGE
@@ -173,7 +167,7 @@ def number_problems(path, figures, references=REFERENCES):
 
 def folder_problems(folder):
     """Files of a record that are missing, files of none, and what is too large or too many."""
-    expected = {INDEX, *(name for r in read_records(folder).values() for name in files_of(r))}
+    expected = {artifacts.INDEX}.union(*map(artifacts.files_of, read_records(folder).values()))
     sizes = {p.name: p.stat().st_size for p in folder.glob("*") if not p.name.startswith(".")}
     limits = [(f"{name}: ", size, "bytes", LARGEST_FILE) for name, size in sorted(sizes.items())]
     limits += [("all files: ", sum(sizes.values()), "bytes", LARGEST_FOLDER)]
@@ -408,9 +402,9 @@ def complete(tmp_path, monkeypatch):
     monkeypatch.delenv("VIDSINDY_NOTEBOOK", raising=False)
     figure = Figure()
     FigureCanvas(figure)
-    save_figure("fig_2", figure, caption="Empty.", numbers={})
-    save_table("table_1", [{"x": 1}], caption="One.")
-    write_index(tmp_path / "figures")
+    artifacts.save_figure("fig_2", figure, caption="Empty.", numbers={})
+    artifacts.save_table("table_1", [{"x": 1}], caption="One.")
+    artifacts.write_index(tmp_path / "figures")
     return tmp_path / "figures"
 
 

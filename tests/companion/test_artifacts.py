@@ -10,14 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from vidsindy_lite.companion.artifacts import (
-    read_records,
-    save_animation,
-    save_figure,
-    save_slider,
-    save_table,
-    write_index,
-)
+from vidsindy_lite.companion import artifacts
+from vidsindy_lite.companion.artifacts import read_records, save_figure, save_slider, save_table
 
 ROWS = [
     {"system": "Lorenz", "terms": 12, "l2": 0.00123456789, "exact": True, "seconds": 2.345},
@@ -67,14 +61,14 @@ def test_figure_and_numbers_are_written_the_same_twice(folder, figure):
 def test_animation_is_the_same_bytes_twice(folder):
     stripes = np.broadcast_to(np.arange(0, 240, 8, np.uint8)[:, None], (20, 30, 3))
     pictures = [np.roll(stripes, step, axis=1) for step in range(3)]
-    save_animation("tour", pictures, caption="Stripes.", numbers={"step": [0, 1, 2]})
+    artifacts.save_animation("tour", pictures, caption="Stripes.", numbers={"step": [0, 1, 2]})
     first = contents(folder)
     assert set(first) == {"tour.gif", "tour.json"}
     with Image.open(folder / "tour.gif") as image:
         assert (image.n_frames, image.size) == (3, (30, 20))
-    save_animation("tour", pictures, caption="Stripes.", numbers={"step": [0, 1, 2]})
+    artifacts.save_animation("tour", pictures, caption="Stripes.", numbers={"step": [0, 1, 2]})
     assert contents(folder) == first
-    write_index(folder)
+    artifacts.write_index(folder)
     assert "![tour](tour.gif)\n\nStripes." in (folder / "README.md").read_text()
 
 
@@ -151,7 +145,7 @@ def test_index_shows_everything_in_order_and_is_the_same_bytes_twice(folder, fig
     save_table("table_S10", ROWS, caption="Ten.")
     save_table("table_S2", ROWS, caption="Two.")
     save_figure("fig_2", figure, caption="A square.", numbers={})
-    write_index(folder)
+    artifacts.write_index(folder)
     page = (folder / "README.md").read_text()
     places = [page.index(f"### {name}\n") for name in ("fig_2", "table_S2", "table_S10")]
     assert places == sorted(places)
@@ -159,5 +153,5 @@ def test_index_shows_everything_in_order_and_is_the_same_bytes_twice(folder, fig
     assert "| [01_first](../notebooks/01_first.ipynb) | [fig_2](#fig_2)" in page
     assert re.search(r"\| Lorenz +\| +12 \| +0.001235 \| +yes \| +2.3 \|", page)
     before = contents(folder)
-    write_index(folder)
+    artifacts.write_index(folder)
     assert contents(folder) == before

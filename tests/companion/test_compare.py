@@ -9,14 +9,8 @@ import pytest
 from PIL import Image
 
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.companion.compare import (
-    differences,
-    outdated,
-    replace,
-    same_notebook,
-    same_text,
-    write_differences,
-)
+from vidsindy_lite.companion import compare
+from vidsindy_lite.companion.compare import differences, same_notebook, same_text, write_differences
 
 COMMON = {"notebook": "01_first", "caption": "A."}
 RECORD = COMMON | {"id": "table_1", "kind": "table"}
@@ -98,8 +92,8 @@ def test_what_is_on_one_side_only(folders, content):
 
 def refresh(committed, regenerated, notebook):
     """Put what is outdated in place, and say what it was."""
-    names = outdated(committed, regenerated, notebook)
-    replace(committed, regenerated, names)
+    names = compare.outdated(committed, regenerated, notebook)
+    compare.replace(committed, regenerated, names)
     return names
 
 
@@ -157,16 +151,12 @@ def notebook(source="print(x)", said="x = 1.0\n", shown="<b>", count=1):
 @pytest.mark.parametrize(
     ("other", "same"),
     [
-        ({}, True),
-        ({"said": "x = 1.0005\n"}, True),
+        ({}, True), ({"said": "x = 1.0005\n"}, True),
         ({"said": "x = 1.1\n"}, True),  # one in the last digit
-        ({"said": "x = 1.2\n"}, False),
-        ({"said": "y = 1.0\n"}, False),
-        ({"shown": "<i>"}, False),
-        ({"source": "print( x)"}, False),
-        ({"count": 0}, False),
+        ({"said": "x = 1.2\n"}, False), ({"said": "y = 1.0\n"}, False),
+        ({"shown": "<i>"}, False), ({"source": "print( x)"}, False), ({"count": 0}, False),
     ],
-)
+)  # fmt: skip
 def test_notebooks_are_compared_by_what_they_say(other, same):
     assert same_notebook(notebook(), notebook(**other)) == same
     assert not same_notebook(notebook(), nbformat.v4.new_notebook())
@@ -180,17 +170,12 @@ def test_notebooks_are_compared_by_what_they_say(other, same):
         ("9.9999981 ± 0.0000083", "9.9912345 ± 0.0000083", False),
         ("2.50 +- 1.0e-1", "2.55 +- 1.1e-1", True),
         ("2.50 ± 0.10", "2.50 0.10", False),
-        ("34 of 35", "35 of 35", False),
-        ("1e-15", "3e-15", False),
-        ("- 10 x", "- 10.1 x", False),
-        ("- 10 x", "- 9.999 x", True),
-        ("0.8 z", "0.9 z", False),
-        ("0.99 y", "1.00 y", False),
-        ("5000.1", "5002.1", True),
-        ("x   9.9996", "x 10.0000", True),
+        ("34 of 35", "35 of 35", False), ("1e-15", "3e-15", False), ("5000.1", "5002.1", True),
+        ("- 10 x", "- 10.1 x", False), ("- 10 x", "- 9.999 x", True), ("0.8 z", "0.9 z", False),
+        ("0.99 y", "1.00 y", False), ("x   9.9996", "x 10.0000", True),
         ("dx/dt = 2.0 x", "dx/dt = 2.0 y", False),
     ],
-)
+)  # fmt: skip
 def test_texts_are_compared_by_words_and_numbers(one, other, same):
     assert same_text(one, other) == same_text(other, one) == same
 

@@ -105,9 +105,8 @@ def test_a_nonlinear_law_in_the_plane_agrees_with_differences():
         return (system.simulate(t, p[:2]) / sigma).ravel()
 
     truth = np.array([1.2, 0.3, 1.1, -0.7, -0.2, -0.4])
-    jacobian = np.stack(
-        [(path(truth + h) - path(truth - h)) / 2e-5 for h in 1e-5 * np.eye(6)], axis=1
-    )
+    slopes = [(path(truth + h) - path(truth - h)) / 2e-5 for h in 1e-5 * np.eye(6)]
+    jacobian = np.stack(slopes, axis=1)
     errors = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
     at = law.terms.index
     ours = [bound.coefficients[at("y"), 0]]

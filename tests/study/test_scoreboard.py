@@ -5,23 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vidsindy_lite.study import ODEBENCH, SYSTEMS, score, scoreboard
-from vidsindy_lite.study.paper import FLOWS, LAWS, REFERENCE_OFFSET, SYSTEMS_S1
-from vidsindy_lite.study.scoreboard import (
-    NOTHING,
-    TIMES,
-    WITHOUT,
-    Ablation,
-    FlowContest,
-    LorenzContest,
-    OdeContest,
-    Outcome,
-    ablation_table,
-    ablations,
-    run_ablation,
-    run_contest,
-    standings,
-)
+from vidsindy_lite.study import ODEBENCH, FlowContest, LorenzContest, OdeContest, score, scoreboard
+from vidsindy_lite.study.paper import FLOWS, LAWS, REFERENCE_OFFSET, SYSTEMS, SYSTEMS_S1
+from vidsindy_lite.study.scoreboard import NOTHING, TIMES, WITHOUT, Ablation, Outcome, run_contest
 
 CONTESTS = [OdeContest(24, 1, 0.02, 0.5), LorenzContest(4, 0.1), FlowContest("Chen", "64 values")]
 
@@ -70,7 +56,7 @@ def test_outcomes_are_counted(monkeypatch):
 
     monkeypatch.setattr(scoreboard, "find_law", find)
     outcomes = run_contest(LorenzContest(4, 0.1, methods=("Gauss-Newton", "PySINDy", "E-SINDy")))
-    table = standings([outcomes])
+    table = scoreboard.standings([outcomes])
     assert list(table.exact) == [True, False, False]
     assert list(table.status) == ["silent", "refused", "silent"]
     assert table.condition.unique() == ["noise 10 %"]
@@ -79,7 +65,7 @@ def test_outcomes_are_counted(monkeypatch):
 
 def test_a_contest_with_all_methods():
     contest = LorenzContest(4, 0.025, methods=scoreboard.CONTESTANTS, origin="data")
-    table = standings([run_contest(contest)]).set_index("method")
+    table = scoreboard.standings([run_contest(contest)]).set_index("method")
     assert table.exact["Gauss-Newton"]
     silent = dict.fromkeys(scoreboard.CONTESTANTS[1:-1], "silent")
     no_path = {scoreboard.ORACLE: "refused"}  # the oracle needs a clean path to choose by
@@ -101,16 +87,16 @@ def test_what_is_replaced_is_there_and_comes_back(monkeypatch, without):
 
     before, seen, contest = current(), [], LorenzContest(2.0, 0.01)
     monkeypatch.setattr(scoreboard, "run_contest", lambda one: seen.extend(current()) or (one,))
-    assert run_ablation(Ablation(contest, without)) == (without, contest)
+    assert scoreboard.run_ablation(Ablation(contest, without)) == (without, contest)
     assert seen == [other for *_, other in WITHOUT[without]]
     assert current() == before
 
 
 def test_the_table_of_the_ablation_counts_what_is_lost_and_gained():
     contests = [LorenzContest(2.0, 0.01), LorenzContest(3.0, 0.01)]
-    assert len(set(ablations(contests))) == 2 * len(WITHOUT)
+    assert len(set(scoreboard.ablations(contests))) == 2 * len(WITHOUT)
     said = {NOTHING: ((True, "ok"), (False, "suspect")), "path": ((False, "ok"), (True, "ok"))}
-    table = ablation_table(
+    table = scoreboard.ablation_table(
         (without, Outcome(contest, "ours", None, exact, status, 2.0))
         for without, both in said.items()
         for contest, (exact, status) in zip(contests, both, strict=True)

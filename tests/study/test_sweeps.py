@@ -130,9 +130,7 @@ def content(file):
 
 def results_of(tasks):
     """What a sweep over tasks gives."""
-    return [
-        [number**2, np.random.default_rng(number).normal(size=3).tolist()] for number, _ in tasks
-    ]
+    return [[n**2, np.random.default_rng(n).normal(size=3).tolist()] for n, _ in tasks]
 
 
 @pytest.mark.slow

@@ -10,21 +10,7 @@ from vidsindy_lite.pipeline import Refused
 from vidsindy_lite.study import score
 from vidsindy_lite.study import trials as experiments
 from vidsindy_lite.study.paper import REFERENCE_OFFSET, SYSTEMS
-from vidsindy_lite.study.trials import (
-    SOURCES,
-    FilmTask,
-    Trial,
-    TrialResult,
-    by_condition,
-    grid,
-    run_film,
-    run_trial,
-    run_trials,
-    significant,
-    summary,
-    tabulate,
-    trial_path,
-)
+from vidsindy_lite.study.trials import FilmTask, Trial, by_condition, grid, run_trial, significant
 
 FRAMES = 150
 
@@ -37,7 +23,7 @@ def nothing_of_another_test(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def filmed():
-    return run_film(FilmTask("SprottE", 1, 150))
+    return experiments.run_film(FilmTask("SprottE", 1, 150))
 
 
 @pytest.fixture
@@ -47,7 +33,7 @@ def this_film(filmed, monkeypatch):
 
 
 def from_source(source, **fields):
-    return trial_path(Trial("SprottE", trial=1, source=source, frames=150, **fields))
+    return experiments.trial_path(Trial("SprottE", trial=1, source=source, frames=150, **fields))
 
 
 def test_film_result_reports_every_error(this_film):
@@ -59,7 +45,7 @@ def test_film_result_reports_every_error(this_film):
     np.testing.assert_allclose(this_film.path_error, error)
     assert (this_film.path_error < 0.01 * truth.std(axis=0)).all()
     assert all(camera.is_calibrated for camera in this_film.rig.cameras)
-    off = {source: np.abs(from_source(source).x - truth).max() for source in SOURCES}
+    off = {source: np.abs(from_source(source).x - truth).max() for source in experiments.SOURCES}
     pixel = max(camera.scale for camera in this_film.rig.cameras)
     assert off["path"] == pytest.approx(off["sub-pixel"], rel=1e-6)
     assert off["sub-pixel"] < 0.2 * off["detector"]
@@ -76,7 +62,7 @@ def test_gauss_newton_is_told_the_systematic_errors_of_what_cameras_reconstructe
         return SYSTEMS["SprottE"]
 
     monkeypatch.setattr(experiments, "discover", watch)
-    for source in SOURCES:
+    for source in experiments.SOURCES:
         run_trial(Trial("SprottE", "blocks", 0.2, 1, source=source, frames=150))
     assert told["truth"] is None
     np.testing.assert_array_equal(told["path"], this_film.systematic)
@@ -114,7 +100,7 @@ def test_where_cameras_cannot_be_learned_no_method_has_a_law(this_film, monkeypa
     assert {result.verdict for result in results} == {"wrong, refused"}
     assert {result.score.missing for result in results} == {8}
     assert results[0].warnings == ("tracks: the motion must determine the cameras",)
-    row = summary(tabulate(results), "system").iloc[0]
+    row = experiments.summary(experiments.tabulate(results), "system").iloc[0]
     assert (row["exact"], row["no path"], row["wrong, ok"]) == ("0 of 6", 6, None)
 
 
@@ -151,7 +137,7 @@ def test_every_method_gets_the_same_data_and_the_number_as_its_seed(this_film, m
     monkeypatch.setattr(experiments, "find_law", watch)
     trial = Trial("SprottE", "blocks", 0.2, 1, source="truth", frames=FRAMES)
     methods = [replace(trial, method=method) for method in experiments.METHODS]
-    assert [result.trial for result in run_trials(methods, jobs=1)] == methods
+    assert [result.trial for result in experiments.run_trials(methods, jobs=1)] == methods
     t, x, _ = seen["Gauss-Newton"]
     assert set(seen) == set(experiments.METHODS)
     for other_t, other_x, seed in seen.values():
@@ -194,8 +180,9 @@ def trials():
     truth = SYSTEMS["Lorenz"].shift(REFERENCE_OFFSET)
     tasks = grid(["Lorenz"], {"noise": (0, 0.2, 0.1), "blocks": (0.3,)}, range(3))
     laws = [SYSTEMS["Lorenz"] if (one.level, one.trial) == (0.2, 1) else truth for one in tasks]
-    return tabulate(
-        TrialResult(one, law, score(law, truth), 0.0) for one, law in zip(tasks, laws, strict=True)
+    return experiments.tabulate(
+        experiments.TrialResult(one, law, score(law, truth), 0.0)
+        for one, law in zip(tasks, laws, strict=True)
     )
 
 
@@ -210,7 +197,7 @@ def test_clean_trials_stand_in_every_condition(trials):
 
 
 def test_summary_counts_by_trial_and_gives_median_and_range(trials):
-    rows = summary(trials, ["condition", "level"])
+    rows = experiments.summary(trials, ["condition", "level"])
     assert list(rows.level) == [0, 0.2, 0.1, 0.3]
     row, odd = rows.iloc[1], trials[~trials.exact].iloc[0]
     assert row["exact"] == "2 of 3"
@@ -221,7 +208,7 @@ def test_summary_counts_by_trial_and_gives_median_and_range(trials):
     assert (row["exact, doubted"], row["wrong, ok"]) == (None, None)  # the stand-in has no status
     told = trials.assign(verdict=[f"{'exact' if e else 'wrong'}, {s}" for e, s in zip(
         trials.exact, ["ok", "suspect"] * 6, strict=True)])  # fmt: skip
-    row = summary(told, "system").iloc[0]
+    row = experiments.summary(told, "system").iloc[0]
     assert row["exact, doubted"] == (told.verdict == "exact, suspect").sum() > 0
     assert row["wrong, ok"] == (told.verdict == "wrong, ok").sum()
     assert (significant(0.00123456), significant(-98765.4, 3)) == (0.0012, -98800)

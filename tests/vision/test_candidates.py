@@ -6,16 +6,8 @@ import pytest
 from helpers import one_a_frame
 
 from vidsindy_lite import write_video
-from vidsindy_lite.vision.candidates import (
-    TOLD,
-    Appearance,
-    Candidates,
-    Spot,
-    best_path,
-    components,
-    followed,
-    plainest_paths,
-)
+from vidsindy_lite.vision import candidates
+from vidsindy_lite.vision.candidates import Candidates, Spot, best_path, followed, plainest_paths
 from vidsindy_lite.vision.plate import shadowed
 from vidsindy_lite.vision.video import Reel
 
@@ -28,7 +20,7 @@ def found_in(*parts, colour=(20, 40, 220), behind=(90, 100, 110), level=1.0):
     for left, top, width, height, strong in parts:
         place = np.s_[top : top + height, left : left + width]
         strength[place], frame[place] = strong, colour
-    return components(strength, level, frame, ground)
+    return candidates.components(strength, level, frame, ground)
 
 
 def test_a_thing_is_where_it_differs():
@@ -101,7 +93,7 @@ def test_a_path_goes_through_what_somebody_points_at():
     both = Candidates.joined([plain, faint])
     assert (both.place[best_path(both)[0], 1] < 100).all()
     told = (both.frame == 12) & (both.place[:, 1] > 100)
-    pinned = both._replace(quality=np.where(told, TOLD, both.quality))
+    pinned = both._replace(quality=np.where(told, candidates.TOLD, both.quality))
     assert (pinned.place[best_path(pinned)[0], 1] > 100).all()
 
 
@@ -117,11 +109,9 @@ def test_paths_have_nothing_in_common_and_the_plainest_comes_first():
 def test_what_stays_in_its_place_or_changes_its_outline_is_less_plain():
     plain = one_a_frame(CURVE, np.full(30, 0.9))
     stays = one_a_frame(20 + 0.02 * CURVE, np.full(30, 0.9))
-    box = plain.box.copy()
-    box[::2, 2] += 6  # of 9 pixels, in each frame: somebody who walks
-    best, *others = (
-        plainest_paths(seen)[0].rating for seen in (plain, stays, plain._replace(box=box))
-    )
+    walks = plain._replace(box=plain.box.copy())
+    walks.box[::2, 2] += 6  # of 9 pixels, in each other frame
+    best, *others = (plainest_paths(seen)[0].rating for seen in (plain, stays, walks))
     assert max(others) < 0.5 * best
 
 
@@ -142,7 +132,7 @@ def drawn(place, colour=(60, 200, 40), shown=True):
 
 def test_what_is_of_another_colour_or_not_there_fits_less():
     size = np.array([17.0, 17])
-    looks = Appearance(drawn((60, 50)), np.array([60.0, 50]), size)
+    looks = candidates.Appearance(drawn((60, 50)), np.array([60.0, 50]), size)
     own, other, none = (
         looks.find(frame, np.array([62.0, 50]), size)
         for frame in (drawn((60, 50)), drawn((60, 50), (60, 60, 200)), drawn(None, shown=False))

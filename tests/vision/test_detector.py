@@ -10,17 +10,10 @@ from hypothesis import strategies as st
 from tiny_onnx import BOX, write_red_detector
 
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.vision import network
+from vidsindy_lite.vision import WEIGHTS, LearnedDetector, check_detector, detections, network
 from vidsindy_lite.vision.network import Network, anchors
 from vidsindy_lite.vision.rendering import BACKGROUNDS, SHAPES, Scene, render
-from vidsindy_lite.vision.tracking import (
-    LEAST,
-    WEIGHTS,
-    LearnedDetector,
-    OnnxDetector,
-    check_detector,
-    detections,
-)
+from vidsindy_lite.vision.tracking import LEAST, OnnxDetector
 
 LOG = json.loads(WEIGHTS.with_suffix(".json").read_text())
 
@@ -38,21 +31,17 @@ def unseen_scene(seed, **fixed):
     return Scene.random(rng, background=str(background), shape=str(shape), **fixed)
 
 
-def column(u, v, size, confidence):
-    return [u, v, size, size, confidence]
-
-
 def test_predictions_that_agree_are_averaged_and_the_surest_comes_first():
-    predictions = np.array([
-        column(100, 50, 20, 0.9), column(102, 50, 20, 0.9), column(100, 53, 22, 0.6),
-        column(104, 60, 20, 0.7),  # of another place,
-        column(101, 51, 20, 0.2),  # and too weak
+    predictions = np.array([  # u, v, width, height, confidence
+        [100, 50, 20, 20, 0.9], [102, 50, 20, 20, 0.9], [100, 53, 22, 22, 0.6],
+        [104, 60, 20, 20, 0.7],  # of another place,
+        [101, 51, 20, 20, 0.2],  # and too weak
     ]).T  # fmt: skip
     (found,) = detections(predictions)
     np.testing.assert_allclose(found.centre, np.array([90 + 91.8 + 60, 45 + 45 + 31.8]) / 2.4)
     assert found.confidence == 0.9
     predictions = np.array(
-        [column(300, 50, 20, 0.6), column(100, 50, 20, 0.8), column(200, 90, 20, LEAST - 0.01)]
+        [[300, 50, 20, 20, 0.6], [100, 50, 20, 20, 0.8], [200, 90, 20, 20, LEAST - 0.01]]
     ).T
     assert [d.centre[0] for d in detections(predictions)] == [100, 300]
     assert [d.centre[0] for d in detections(predictions, most=1)] == [100]
@@ -122,14 +111,9 @@ def test_bad_onnx_files(tmp_path):
         thin.predict(np.zeros((64, 64, 3), np.uint8))
 
 
-@pytest.fixture
-def small(monkeypatch):
-    """Training that takes seconds."""
-    monkeypatch.setattr(network, "BATCH", 2)
+def test_a_training_again_gives_the_same_weights_and_log(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(network, "BATCH", 2)  # it takes seconds
     monkeypatch.setattr(network, "_EACH", 1)
-
-
-def test_a_training_again_gives_the_same_weights_and_log(small, tmp_path, capsys):
     log = network.train(tmp_path / "one.pt", seed=3, steps=2)
     command = ["train-detector", "--seed", "3", "--steps", "2", "--output"]
     assert main([*command, str(tmp_path / "other.pt")]) == 0

@@ -37,6 +37,11 @@ def disc(image, place, radius, colour):
     return image
 
 
+def ball(truth, radius, colour, light=lambda i: 1):
+    """What draws a ball where it is in a frame, and lights the image."""
+    return lambda image, i: light(i) * disc(image, truth[i], radius, colour)
+
+
 def around(place, side, frame=10):
     return Hint(frame=frame, box=(*(place[frame] - side / 2), side, side))
 
@@ -66,11 +71,8 @@ def test_a_large_ball_that_never_leaves_its_own_ground(tmp_path):
     radius = 22
     leaves = 0.45 * radius * np.column_stack([np.sin(ANGLE), np.sin(2.3 * ANGLE + 1)])
     truth = [80, 45] + leaves
-
-    def draw(image, i):
-        return disc(image, truth[i], radius, (210, 60, 30))
-
-    path = painted(tmp_path, texture(np.random.default_rng(2), 160, 90), draw, N)
+    ground = texture(np.random.default_rng(2), 160, 90)
+    path = painted(tmp_path, ground, ball(truth, radius, (210, 60, 30)), N)
     found, error = followed(path, truth, around(truth, 2 * radius + 4))
     assert np.nanpercentile(error, 95) < 1
     assert not found.warnings
@@ -181,22 +183,6 @@ def test_what_is_hidden_altogether_stays_a_gap(tmp_path):
     assert np.nanmax(error) < 3
 
 
-def beach_ball(folder, radius, rate, colours, flicker):
-    """A ball of two halves that turns by `rate` radians a frame, before bricks."""
-    half = cv2.ellipse2Poly((0, 0), (1000, 1000), 0, 0, 180, 4) / 1000 * radius
-
-    def draw(image, i):
-        at = np.rint(16 * places()[i]).astype(int)
-        for colour, first in zip(colours, (0, np.pi), strict=True):
-            angle = rate * i + first
-            spin = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-            corners = np.rint(16 * (half @ spin) + at).astype(np.int32)
-            cv2.fillConvexPoly(image, corners, colour, cv2.LINE_AA, 4)
-        return (1 + flicker * np.sin(1.7 * i)) * image
-
-    return painted(folder, BRICKS, draw, LENGTH, 1.5)
-
-
 @pytest.mark.parametrize(
     ("colours", "rate", "flicker"),
     [
@@ -205,7 +191,18 @@ def beach_ball(folder, radius, rate, colours, flicker):
     ],
 )
 def test_a_ball_of_two_halves_that_turns(tmp_path, colours, rate, flicker):
-    path = beach_ball(tmp_path, 12, rate, colours, flicker)
+    half = cv2.ellipse2Poly((0, 0), (1000, 1000), 0, 0, 180, 4) / 1000 * 12
+
+    def draw(image, i):
+        at = np.rint(16 * places()[i]).astype(int)
+        for colour, first in zip(colours, (0, np.pi), strict=True):
+            angle = rate * i + first  # radians
+            spin = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+            corners = np.rint(16 * (half @ spin) + at).astype(np.int32)
+            cv2.fillConvexPoly(image, corners, colour, cv2.LINE_AA, 4)
+        return (1 + flicker * np.sin(1.7 * i)) * image
+
+    path = painted(tmp_path, BRICKS, draw, LENGTH, 1.5)
     _, error = followed(path, places(), least=0.8)
     assert np.nanpercentile(error, 90) < 1
 
@@ -248,10 +245,7 @@ def test_where_two_things_move_alike_it_says_so_and_a_hint_decides(tmp_path):
 def test_a_small_target_is_followed_from_a_box_that_is_drawn_loosely(tmp_path):
     turn = np.linspace(0, 4 * np.pi, 60)
     truth = np.column_stack([240 + 170 * np.cos(turn), 120 + 80 * np.sin(turn)])
-
-    def draw(image, i):
-        return disc(image, truth[i], 3, (220, 30, 30)) * (1 + 0.05 * np.sin(0.7 * i))
-
+    draw = ball(truth, 3, (220, 30, 30), lambda i: 1 + 0.05 * np.sin(0.7 * i))
     path = painted(tmp_path, texture(np.random.default_rng(3), 480, 240), draw, 60)
     found, error = followed(path, truth, around(truth, 16), 0.9)
     assert np.nanmax(error) < 1.5
@@ -264,10 +258,7 @@ def test_a_small_target_is_followed_from_a_box_that_is_drawn_loosely(tmp_path):
 def test_a_target_that_is_half_in_the_shade_is_the_whole_of_it(tmp_path):
     sway = np.column_stack([80 + 40 * np.sin(ANGLE / 2), 90 + 40 * np.sin(ANGLE)])
     light = 1 - 0.5 / (1 + np.exp((np.arange(320) - 115) / 2))
-
-    def draw(image, i):
-        return disc(image, sway[i], 22, (220, 120, 170)) * light[None, :, None]
-
+    draw = ball(sway, 22, (220, 120, 170), lambda i: light[None, :, None])
     path = painted(tmp_path, texture(np.random.default_rng(6), 320, 180), draw, N)
     assert np.nanmax(followed(path, sway, least=0.6)[1]) < 1.5
     assert np.nanpercentile(followed(path, sway, around(sway, 44))[1], 95) < 1.5

@@ -8,17 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vidsindy_lite.vision import rendering
-from vidsindy_lite.vision.rendering import (
-    BACKGROUNDS,
-    COLOURS,
-    SHAPES,
-    Scene,
-    coverage,
-    render,
-    render_labelled,
-    render_restless,
-    render_video,
-)
+from vidsindy_lite.vision.rendering import BACKGROUNDS, COLOURS, SHAPES, Scene, render, render_video
 from vidsindy_lite.vision.video import read_video
 
 SMALL = (96, 80)
@@ -53,7 +43,7 @@ def test_drawn_centroid_and_area(shape, size, u, v, seed):
 def test_labels_of_a_frame():
     scene = Scene("plain", size=20, occluders=((50, 0, 21, 80),), image_size=SMALL)
     track = [[30.0, 40.0], [49.5, 40.0], [60.0, 40.0], [-0.5, 40.0], [np.nan, np.nan]]
-    drawn = list(render_labelled(track, scene))
+    drawn = list(rendering.render_labelled(track, scene))
     whole, half, hidden, cut, absent = drawn
     for labelled, visible in ((whole, 1), (half, 0.5), (hidden, 0), (cut, 0.5)):
         np.testing.assert_allclose(labelled.extent, 20, atol=0.02)
@@ -67,13 +57,13 @@ def test_labels_of_a_frame():
 def test_a_restless_background_moves_behind_the_target():
     scene, track = Scene("bricks", size=16, image_size=SMALL), np.full((3, 2), [48.0, 40.0])
     shifts = np.array([[0, 0], [5, -3], [0, 0]])
-    first, second, third = render_restless(track, scene, shifts, light=[1, 1, 0.5])
+    first, second, third = rendering.render_restless(track, scene, shifts, light=[1, 1, 0.5])
     np.testing.assert_array_equal(first[:20, 5:], second[3:23, :-5])
     np.testing.assert_array_equal(first[38:43, 46:51], second[38:43, 46:51])
     np.testing.assert_allclose(third[:20].astype(float), first[:20] / 2, atol=0.51)
     for bad in (shifts[:2], shifts / 2):
         with pytest.raises(ValueError, match=r"shifts: must be integers .* \(3, 2\), got"):
-            next(render_restless(track, scene, bad))
+            next(rendering.render_restless(track, scene, bad))
 
 
 def test_shapes_map_the_outline_and_keep_the_centroid():
@@ -158,7 +148,7 @@ def test_render_rejects(track, message):
 def test_a_rectangle_covers_each_pixel_by_its_common_part(edges, clockwise, first):
     left, top, width, height = np.array(edges) / 16  # along v to a sixteenth of a pixel
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [width, height] + [left, top]
-    alpha, corner = coverage(np.roll(corners[:: 1 if clockwise else -1], first, axis=0))
+    alpha, corner = rendering.coverage(np.roll(corners[:: 1 if clockwise else -1], first, axis=0))
     pixels = [corner[k] + np.arange(alpha.shape[1 - k]) for k in (0, 1)]
     u, v = (
         np.clip(np.minimum(x + 0.5, low + side) - np.maximum(x - 0.5, low), 0, 1)
@@ -170,7 +160,7 @@ def test_a_rectangle_covers_each_pixel_by_its_common_part(edges, clockwise, firs
 def test_of_several_targets_the_later_ones_are_in_front():
     scene = Scene("plain", size=20, image_size=SMALL)
     track = np.array([[30.0, 40, 60, 44, 33, 40], [30, 40, np.nan, np.nan, 80, 40]])
-    drawn = list(render_labelled(track, scene))
+    drawn = list(rendering.render_labelled(track, scene))
     empty = next(render([[np.nan, np.nan]], scene))
     changed = [(labelled.frame != empty).any(axis=2) for labelled in drawn]
     assert changed[0][40, 21:43].all()
@@ -183,24 +173,13 @@ def test_of_several_targets_the_later_ones_are_in_front():
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("background", "moon"),
-        ("shape", "cube"),
-        ("colour", "teal"),
-        ("size", 2),
-        ("turns", np.inf),
-        ("tumbling", -1),
-        ("size_variation", 0.9),
-        ("noise_variance", -0.1),
-        ("shape_seed", -1),
-        ("turns", "many"),
-        ("image_size", (10, 10)),
-        ("occluders", ((1, 2, 3),)),
-        ("occluders", ((0, 1, 4, 512),)),
-        ("occluders", ((-1, 0, 9, 9),)),
-        ("trees", ((1, 2, 3),)),
-        ("trees", ((0, 500, 50, 50),)),
+        ("background", "moon"), ("shape", "cube"), ("colour", "teal"), ("size", 2),
+        ("turns", np.inf), ("turns", "many"), ("tumbling", -1), ("size_variation", 0.9),
+        ("noise_variance", -0.1), ("shape_seed", -1), ("image_size", (10, 10)),
+        *[("occluders", (box,)) for box in ((1, 2, 3), (0, 1, 4, 512), (-1, 0, 9, 9))],
+        *[("trees", (box,)) for box in ((1, 2, 3), (0, 500, 50, 50))],
     ],
-)
+)  # fmt: skip
 def test_scene_rejects(field, value):
     with pytest.raises(ValueError, match=f"^{field}: must|^{field}: each must"):
         Scene(**{field: value})

@@ -22,8 +22,14 @@ def winding_path(n=150, size=SIZE, margin=28):
     )
 
 
-def errors(path, truth):
-    return np.linalg.norm(track(path).pixels - truth, axis=1)
+def tracked(folder, truth, background, size, seed=0, detector="auto", **look):
+    """What is found of a target of this size that is filmed before a background."""
+    scene = Scene(background, size=size, image_size=SIZE, **look)
+    return track(render_video(folder / "clip.mov", truth, scene, seed=seed), detector)
+
+
+def errors(found, truth):
+    return np.linalg.norm(found.pixels - truth, axis=1)
 
 
 def distance_to_rectangle(points, rectangle):
@@ -35,15 +41,13 @@ def distance_to_rectangle(points, rectangle):
 @pytest.mark.parametrize("background", ["plain", "wood", "sky", "bricks"])
 def test_an_ordinary_video_raises_no_doubt(tmp_path, background):
     clean, truth = background in ("plain", "wood"), winding_path(60)
-    scene = Scene(background, size=18, noise_variance=0 if clean else 0.01, image_size=SIZE)
-    path = render_video(tmp_path / "clip.mov", truth, scene, seed=1)
-    found = track(path)
-    error = np.linalg.norm(found.pixels - truth, axis=1)
+    found = tracked(tmp_path, truth, background, 18, 1, noise_variance=0 if clean else 0.01)
+    error = errors(found, truth)
     assert np.isfinite(error).all()
     assert np.sqrt(np.mean(error**2)) < (0.02 if clean else 0.2)
     assert found.detector == "background"
     assert found.warnings == ()
-    np.testing.assert_array_equal(found.pixels, track(path, "background").pixels)
+    np.testing.assert_array_equal(found.pixels, track(tmp_path / "clip.mov", "background").pixels)
 
 
 @pytest.mark.parametrize(
@@ -51,15 +55,8 @@ def test_an_ordinary_video_raises_no_doubt(tmp_path, background):
 )
 def test_a_hidden_target_is_not_seen_and_a_partly_hidden_one_not_trusted(tmp_path, post, variance):
     truth = winding_path(200)
-    scene = Scene(
-        "bricks",
-        size=22,
-        size_variation=0.1,
-        noise_variance=variance,
-        occluders=(post,),
-        image_size=SIZE,
-    )
-    error = errors(render_video(tmp_path / "clip.mov", truth, scene, seed=4), truth)
+    look = {"size_variation": 0.1, "noise_variance": variance, "occluders": (post,)}
+    error = errors(tracked(tmp_path, truth, "bricks", 22, 4, **look), truth)
     distance = distance_to_rectangle(truth, post)
     assert np.isnan(error[distance < 8]).all()
     assert np.isfinite(error[distance > 14]).mean() > 0.93
@@ -68,8 +65,7 @@ def test_a_hidden_target_is_not_seen_and_a_partly_hidden_one_not_trusted(tmp_pat
 
 def test_a_target_across_the_border_is_not_trusted(tmp_path):
     truth = winding_path(100, margin=0)
-    scene = Scene("wood", size=20, image_size=SIZE)
-    error = errors(render_video(tmp_path / "clip.mov", truth, scene), truth)
+    error = errors(tracked(tmp_path, truth, "wood", 20), truth)
     depth = np.minimum(truth, np.array(SIZE) - 1 - truth).min(axis=1)
     assert np.isnan(error[depth < 9.5]).all()
     assert np.isfinite(error[depth > 12]).all()
@@ -79,8 +75,7 @@ def test_a_target_across_the_border_is_not_trusted(tmp_path):
 def test_frames_without_target_are_nan_and_it_is_found_again(tmp_path):
     drawn = winding_path(100)
     drawn[40:60] = np.nan
-    path = render_video(tmp_path / "clip.mov", drawn, Scene("sea", size=14, image_size=SIZE))
-    found = track(path)
+    found = tracked(tmp_path, drawn, "sea", 14)
     unseen = np.isnan(drawn[:, 0])
     assert np.array_equal(np.isnan(found.pixels[:, 0]), unseen)
     assert np.nanmax(np.abs(found.pixels - drawn)) < 0.05
@@ -95,9 +90,7 @@ def test_a_target_that_stays_for_long_leaves_no_ghost(tmp_path):
     n, stay = 100, 60
     truth = np.tile([60.0, 60.0], (n, 1))
     truth[stay:] += np.linspace(0, 1, n - stay)[:, None] * [150, 80]
-    error = errors(
-        render_video(tmp_path / "clip.mov", truth, Scene("bricks", size=24, image_size=SIZE)), truth
-    )
+    error = errors(tracked(tmp_path, truth, "bricks", 24), truth)
     assert np.isfinite(error).mean() > 0.93
     assert np.nanmax(error) < 0.1
 
@@ -106,8 +99,7 @@ def test_a_target_that_stays_for_long_leaves_no_ghost(tmp_path):
 def test_what_is_in_few_of_the_sampled_frames_leaves_no_hole_in_the_ground(tmp_path, shown, pace):
     truth = np.full((400, 2), np.nan)
     truth[shown] = [60, 90] + np.outer(np.arange(len(shown)), [pace, 0.0])
-    scene = Scene("bricks", size=24, image_size=SIZE)
-    found = track(render_video(tmp_path / "clip.mov", truth, scene, seed=1)).pixels
+    found = tracked(tmp_path, truth, "bricks", 24, 1).pixels
     assert np.isnan(found[np.isnan(truth)]).all()
     assert np.nanmax(np.abs(found - truth), initial=0) < 0.1
 
@@ -119,30 +111,25 @@ def circle(radius, n=150):
 
 def test_a_target_that_hardly_leaves_its_place_is_followed_at_its_middle(tmp_path):
     truth, size = circle(2, 60), 18
-    scene = Scene("sea", size=size, image_size=SIZE)
-    path = render_video(tmp_path / "clip.mov", truth, scene, seed=2)
+    found = tracked(tmp_path, truth, "sea", size, 2)
     box = Hint(frame=10, box=(*(truth[10] - size / 2), size, size))
-    for hint in (None, box):
-        error = np.linalg.norm(track(path, target=hint).pixels - truth, axis=1)
+    for one in (found, track(tmp_path / "clip.mov", target=box)):
+        error = errors(one, truth)
         assert np.isfinite(error).mean() > 0.95
         assert np.nanmax(error) < 0.6
 
 
 def test_nothing_is_invented_in_an_empty_scene(tmp_path):
-    scene = Scene("hills", noise_variance=0.01, image_size=SIZE)
-    path = render_video(tmp_path / "clip.mov", np.full((40, 2), np.nan), scene)
-    found = track(path).pixels
+    found = tracked(tmp_path, np.full((40, 2), np.nan), "hills", 18, noise_variance=0.01).pixels
     assert found.shape == (40, 2)
     assert np.isnan(found).all()
-    scene = Scene("sea", size=18, image_size=SIZE)  # what stands still is background
-    path = render_video(tmp_path / "clip.mov", circle(0, 60), scene, seed=2)
-    assert np.isnan(track(path).pixels).all()
+    still = tracked(tmp_path, circle(0, 60), "sea", 18, 2)  # it is background
+    assert np.isnan(still.pixels).all()
 
 
 def test_a_single_frame_shows_no_motion(tmp_path):
-    path = render_video(tmp_path / "clip.mov", [[80.0, 80.0]], Scene(image_size=SIZE))
     with pytest.raises(ValueError, match="path: must hold two frames or more, got one in"):
-        track(path)
+        tracked(tmp_path, [[80.0, 80.0]], "hills", 18)
 
 
 def shaking(n, seed=0):
@@ -178,8 +165,8 @@ def test_auto_takes_out_the_motion_of_the_camera_and_of_the_light(
 def test_the_learned_detector_invents_nothing_behind_a_post(tmp_path):
     truth = winding_path(75)
     post = (100, 0, 44, SIZE[1])
-    scene = Scene("bricks", "irregular", size=22, occluders=(post,), image_size=SIZE)
-    found = track(render_video(tmp_path / "clip.mov", truth, scene, seed=4), "learned")
+    look = {"shape": "irregular", "occluders": (post,)}
+    found = tracked(tmp_path, truth, "bricks", 22, 4, "learned", **look)
     inside = np.abs(truth[:, 0] - (post[0] + (post[2] - 1) / 2)) < post[2] / 2 - 13
     assert inside.sum() >= 5
     assert np.isnan(found.pixels[inside]).all()
@@ -198,13 +185,11 @@ def test_that_nothing_is_found_is_told(tmp_path):
 
 def test_any_onnx_model_tracks(tmp_path):
     truth = winding_path(40)
-    scene = Scene("sea", size=32, image_size=SIZE)
-    path = render_video(tmp_path / "clip.mov", truth, scene)
     model = write_red_detector(tmp_path / "red.onnx", (256, 256))
-    found = track(path, model)
+    found = tracked(tmp_path, truth, "sea", 32, detector=model)
     assert found.detector == str(model)
     assert np.isfinite(found.pixels).mean() > 0.9
-    assert np.nanmedian(np.linalg.norm(found.pixels - truth, axis=1)) < 3  # its anchors: 8 px apart
+    assert np.nanmedian(errors(found, truth)) < 3  # its anchors: 8 px apart
 
 
 @pytest.mark.parametrize("detector", ["yolo", "model.pt", None, np.zeros(2)])

@@ -18,24 +18,14 @@ import pytest
 from phones import waver, write_at
 
 import vidsindy_lite as vl
-from vidsindy_lite import track
-from vidsindy_lite.vision import frame_clock, video
-from vidsindy_lite.vision.rendering import Scene, render, render_video
-from vidsindy_lite.vision.video import (
-    pick_frames,
-    read_frame,
-    read_video,
-    reduce,
-    video_info,
-    write_video,
-)
+from vidsindy_lite.vision import read_frame, read_video, render, video, video_info, write_video
 
 SMALL = (96, 80)
 
 
 def test_files_of_still_backgrounds_are_small_and_all_alike(tmp_path):
-    scene, track = Scene("hills", size=12), np.linspace([100, 100], [200, 180], 60)
-    paths = [render_video(tmp_path / name, track, scene) for name in ("a.mov", "b.mov", "c.mkv")]
+    scene, track = vl.Scene("hills", size=12), np.linspace([100, 100], [200, 180], 60)
+    paths = [vl.render_video(tmp_path / name, track, scene) for name in ("a.mov", "b.mov", "c.mkv")]
     first, again, other = (path.read_bytes() for path in paths)
     assert first == again
     assert len(first) < 0.15 * len(other)
@@ -107,7 +97,7 @@ def test_write_video_rejects_frames(tmp_path, frame):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("read", [read_video, video_info, track])
+@pytest.mark.parametrize("read", [read_video, video_info, vl.track])
 def test_reading_rejects(tmp_path, capfd, read):
     with pytest.raises(ValueError, match="path: must be the name of a file, got 5"):
         read(5)
@@ -122,10 +112,8 @@ def test_reading_rejects(tmp_path, capfd, read):
     with pytest.raises(ValueError, match="path: must be a video file that PyAV can read"):
         read(text)
     headers = tmp_path / "headers.avi"
-    writer = cv2.VideoWriter(
-        str(headers), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"MJPG"), 25, (64, 64)
-    )
-    writer.release()
+    fourcc = cv2.VideoWriter_fourcc(*"MJPG")
+    cv2.VideoWriter(str(headers), cv2.CAP_FFMPEG, fourcc, 25, (64, 64)).release()
     with pytest.raises(ValueError, match=f"path: must .* '{headers}'"):
         read(headers)
     with wave.open(str(tmp_path / "sound.wav"), "wb") as sound:
@@ -167,14 +155,14 @@ def test_half_a_file_is_told_and_frames_are_not_those_of_the_sound(
     assert len(list(read_video(path))) == 60
     path.write_bytes(whole[: len(whole) // 2])
     assert video_info(path).frames == pytest.approx(60, abs=1) or sound == 800
-    told = track(path).warnings
+    told = vl.track(path).warnings
     assert any("frames can be read: it is cut off" in warning for warning in told)
     with pytest.raises(ValueError, match="target: its frame must be one of .*, got 55"):
-        track(path, target=vl.Hint(frame=55, box=(55, 15, 20, 20)))
+        vl.track(path, target=vl.Hint(frame=55, box=(55, 15, 20, 20)))
 
 
 def drawn(n=30, **options):
-    scene = Scene("hills", image_size=SMALL, **options)
+    scene = vl.Scene("hills", image_size=SMALL, **options)
     return list(render(np.linspace([20, 20], [70, 60], n), scene))
 
 
@@ -248,7 +236,7 @@ def test_one_frame_is_that_of_all_whatever_the_times(tmp_path, name, codec, pixe
     for number in (len(frames) - 1, 0, 1, 7, 8, 9, 31, 49, 50, 51, 75):
         assert np.array_equal(read_frame(path, number), frames[number])
     numbers = [0, 3, 4, 20, 21, 50]
-    picked = list(pick_frames(path, numbers))
+    picked = list(video.pick_frames(path, numbers))
     assert all(np.array_equal(one, frames[k]) for one, k in zip(picked, numbers, strict=True))
     for number in (len(frames), 2**63, 10**30):
         with pytest.raises(ValueError, match=rf"number: .*must .*, got {number}"):
@@ -378,7 +366,7 @@ def test_the_clock_of_a_phone_is_right_and_dropped_frames_are_gaps(
 ):
     seconds = KEPT / rate if rate else waver(np.random.default_rng(0), 90)
     path = write_at(tmp_path / name, seconds, blank(len(seconds)), codec, pixels)
-    clock, fps = frame_clock(path), video_info(path).fps
+    clock, fps = video.frame_clock(path), video_info(path).fps
     assert len(clock) == len(list(read_video(path))) == len(seconds)
     assert np.abs(clock / fps - (seconds - seconds[0])).max() < 1e-3
     assert fps == pytest.approx(rate or 1 / np.median(np.diff(seconds)), rel=1e-3 if rate else 0.05)
@@ -389,7 +377,7 @@ def test_the_clock_of_a_phone_is_right_and_dropped_frames_are_gaps(
 @pytest.mark.parametrize(("name", "codec"), ALL)
 def test_even_files_have_an_even_clock_though_their_times_are_rounded(tmp_path, fps, name, codec):
     path = write_video(tmp_path / name, blank(50), fps, codec)
-    assert frame_clock(path).tolist() == list(range(50))
+    assert video.frame_clock(path).tolist() == list(range(50))
     assert video_info(path)[:2] == (50, pytest.approx(float(fps), rel=1e-4))
 
 
@@ -405,8 +393,8 @@ def test_the_start_that_an_editor_has_cut_off_does_not_count(tmp_path):
                 packet.stream = stream
                 target.mux(packet)
     frames = list(read_video(path))
-    assert len(frames) == len(frame_clock(path)) == video_info(path).frames == 20
-    assert frame_clock(path).tolist() == list(range(20))
+    assert len(frames) == len(video.frame_clock(path)) == video_info(path).frames == 20
+    assert video.frame_clock(path).tolist() == list(range(20))
     assert np.array_equal(read_frame(path, 4), frames[4])
     assert np.array_equal(frames[0], list(read_video(whole))[10])
 
@@ -433,13 +421,9 @@ def test_what_phones_code_is_read_in_eight_bits(tmp_path, name, codec, pixels):
         assert np.abs(ours.astype(int) - true).mean() < 4
 
 
-FIELDS = (160, 120)
-INTERLACED = {"x264-params": "interlaced=1:tff=1", "crf": "6"}
-
-
 def interlaced(path, track, **options):
     """A film with two views a frame: the upper lines of one, the lower of the next."""
-    views = list(render(track, Scene("plain", size=14, image_size=FIELDS)))
+    views = list(render(track, vl.Scene("plain", size=14, image_size=(160, 120))))
     frames = [view.copy() for view in views[::2]]
     for frame, later in zip(frames, views[1::2], strict=True):
         frame[1::2] = later[1::2]
@@ -450,7 +434,7 @@ def interlaced(path, track, **options):
 def test_the_target_is_where_it_was_at_one_instant(tmp_path):
     along = np.linspace(0, 2 * np.pi, 120)
     track = np.column_stack((80 + 45 * np.cos(along), 60 + 35 * np.sin(2 * along)))
-    path = interlaced(tmp_path / "a.mp4", track, **INTERLACED)
+    path = interlaced(tmp_path / "a.mp4", track, crf="6", **{"x264-params": "interlaced=1:tff=1"})
     assert np.array_equal(read_frame(path, 19), list(read_video(path))[19])
     found = vl.track(path).pixels
     seen = np.isfinite(found).all(axis=1)
@@ -470,7 +454,7 @@ def fill(folder, names, size=(32, 24)):
 
 
 def shades(path):
-    return [int(frame[0, 0, 0]) for frame in vl.read_video(path)]
+    return [int(frame[0, 0, 0]) for frame in read_video(path)]
 
 
 @pytest.mark.parametrize("place", ["弾む球", "it's $5"])
@@ -480,10 +464,10 @@ def test_a_folder_is_a_film_in_the_order_of_its_numbers(tmp_path, place):
     (folder / ".hidden.png").write_text("no image")
     assert shades(folder) == [10 * i for i in range(12)]
     assert video_info(folder) == (12, 0, (32, 24))
-    assert frame_clock(folder).tolist() == list(range(12))
-    assert vl.read_frame(folder, 10)[0, 0, 0] == 100
+    assert video.frame_clock(folder).tolist() == list(range(12))
+    assert read_frame(folder, 10)[0, 0, 0] == 100
     with pytest.raises(ValueError, match="number: .* must have that frame, got 12"):
-        vl.read_frame(folder, 12)
+        read_frame(folder, 12)
 
 
 @pytest.mark.parametrize("pattern", ["a_%04d.png", "a_%d.png", "a_????.png"])
@@ -494,12 +478,12 @@ def test_a_pattern_leaves_the_others_aside(tmp_path, pattern):
     path = tmp_path / "none" / pattern
     said = re.escape(f"nor images of that name, got '{path}'")
     with pytest.raises(FileNotFoundError, match=said):
-        vl.read_video(path)
+        read_video(path)
 
 
 def test_a_missing_image_is_a_dropped_frame_and_letters_are_in_their_order(tmp_path):
     folder = fill(tmp_path / "shots", [f"{i:03d}.png" for i in (100, 110, 130, 140, 150)])
-    assert frame_clock(folder).tolist() == [0, 1, 3, 4, 5]
+    assert video.frame_clock(folder).tolist() == [0, 1, 3, 4, 5]
     assert shades(fill(tmp_path / "letters", ["a.png", "b.png", "c.png"])) == [0, 10, 20]
 
 
@@ -514,7 +498,7 @@ def test_a_missing_image_is_a_dropped_frame_and_letters_are_in_their_order(tmp_p
 )
 def test_folders_that_are_no_film(tmp_path, names, message):
     folder = fill(tmp_path / "shots", names)
-    for read in (vl.read_video, video_info, frame_clock):
+    for read in (read_video, video_info, video.frame_clock):
         with pytest.raises(ValueError, match=message):
             read(folder)
 
@@ -536,9 +520,8 @@ def pages(dtype, shift=0):
     """A bright disc that goes to and fro, 40 images."""
     for k in range(40):
         page = np.full((60, 80), 90, np.uint8)
-        cv2.circle(
-            page, (round(40 + 25 * np.cos(k / 5)), round(30 + 17 * np.sin(k / 5))), 5, 230, -1
-        )
+        u, v = 40 + 25 * np.cos(k / 5), 30 + 17 * np.sin(k / 5)
+        cv2.circle(page, (round(u), round(v)), 5, 230, -1)
         yield page.astype(dtype) << shift
 
 
@@ -548,7 +531,7 @@ def test_pages_of_one_tiff_are_a_film_of_as_many_bits_as_it_uses(tmp_path, name,
     cv2.imwritemulti(str(tmp_path / "a.tif"), list(pages(dtype, bits - 8)))
     path = (tmp_path / "a.tif").rename(tmp_path / name)
     assert video_info(path)[::2] == (40, (80, 60))
-    film = [page[..., 0] for page in vl.read_video(path)]
+    film = [page[..., 0] for page in read_video(path)]
     np.testing.assert_array_equal(film, list(pages(np.uint8)))
     assert len(vl.track(path).pixels) == 40
     (tmp_path / "bad.tif").write_bytes(path.read_bytes()[:100])
@@ -563,5 +546,5 @@ def test_reduced_pixels_are_means_the_last_row_and_column_repeated(factor):
     means = cut.reshape(len(cut) // factor, factor, -1, factor, 3).mean(axis=(1, 3))
     # Each step, a halving or the rest, rounds to whole levels.
     steps = {2: 1, 3: 1, 4: 2, 6: 2, 8: 3}[factor]
-    np.testing.assert_allclose(reduce(image, factor), means, atol=0.51 * steps)
-    assert reduce(image, 1) is image
+    np.testing.assert_allclose(video.reduce(image, factor), means, atol=0.51 * steps)
+    assert video.reduce(image, 1) is image
