@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike
 from scipy.linalg import qr
 
@@ -453,14 +454,15 @@ def without_wild(track: Floats, name: str) -> tuple[Floats, str]:
 
     Without such a place those beside it are on one path, as they are not where a target bounces.
     """
-    seen = np.flatnonzero(np.isfinite(track).all(axis=1))
-    kept, far, most = seen, list[int](), len(seen) // 10
+    kept = seen = np.flatnonzero(np.isfinite(track).all(axis=1))
+    most, wild = len(seen) // 10, list[int]()
     limit = max(_WILD * float(np.median(_missed(seen, track))), cameras.GROSS) if most else np.inf
-    while (apart := _missed(kept, track)).max(initial=0.0) > limit and len(far) <= most:
-        far, kept = [*far, int(kept[apart.argmax()])], np.delete(kept, apart.argmax())
-    order = np.sort(np.searchsorted(seen, far)) if len(far) <= most else np.zeros(0, dtype=int)
-    gaps, wild = np.diff(order, prepend=-2, append=len(seen) + 1), []
-    for row in seen[order[(gaps[:-1] > 1) & (gaps[1:] > 1)]].tolist():
+    while len(seen) <= len(kept) + most and ((apart := _missed(kept, track)) > limit).any():
+        highest = sliding_window_view(np.pad(apart, 4), 9).max(axis=1)
+        kept = kept[(apart <= limit) | (apart < highest)]
+    order = np.searchsorted(seen, np.setdiff1d(seen, kept))
+    gaps = np.diff(order, prepend=-2, append=len(seen) + 1)
+    for row in seen[order[(gaps[:-1] > 1) & (gaps[1:] > 1)]].tolist() if len(order) <= most else ():
         near = np.sort(kept[np.argsort(np.abs(kept - row))[:10]])
         back = np.sort(np.append(near, row))
         own = _missed(back, track)[np.searchsorted(back, row)]
