@@ -119,6 +119,7 @@ def test_what_is_bound_to_a_plane_has_its_law_there(order):
     said = found.discovery.physics()
     pulls = [float(said[f"spring constant {axis}"].value) for axis in "xy"]
     np.testing.assert_allclose(sorted(pulls), [16, 28.09], rtol=0.01)
+    assert float(found.period.value) == pytest.approx(2 * np.pi / 4, rel=0.01)  # it moves furthest
     np.testing.assert_allclose(found.fitted, x, atol=5e-3)
 
 
