@@ -100,7 +100,7 @@ def test_the_energy_along_the_path():
     assert energy == pytest.approx(2 * path[:, 0] ** 2 + path[:, 1] ** 2 / 2, abs=1e-6)
     assert "falls" in str(spring)
     assert "is kept" in str(told(law_of(x={"x": -4.0, "x^3": -1}), [1, 0]))
-    assert "drives" in str(told(law_of(x={"x": -1.0, "vx": 1, "x^2 vx": -1}), [0.1, 0]))
+    assert "it is driven" in str(told(law_of(x={"x": -1.0, "vx": 1, "x^2 vx": -1}), [0.1, 0]))
     swirl = law_of(x={"x": -1.0, "y": -1}, y={"x": 1.0, "y": -1})
     assert "no potential" in str(told(swirl, [1, 0, 0, 1]))
     assert told(swirl, [1, 0, 0, 1]).energy == ()

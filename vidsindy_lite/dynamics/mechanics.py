@@ -410,7 +410,7 @@ def _balance(energy: Sequence[Floats], paths: Sequence[Floats], kept: float = 1e
     fall = max(float(level[0] - level[-1]) for level in levels)
     share = "of the largest kinetic energy"
     if rise > kept:
-        return f"the energy rises by {100 * rise:.3g} % {share}: a drive, or a wrong force"
+        return f"the energy rises by {100 * rise:.3g} % {share}: it is driven, or a force is wrong"
     if fall > kept:
         return f"the energy falls by {100 * fall:.3g} % {share}, and never rises"
     return f"the energy is kept, to {100 * kept:g} % {share}"
