@@ -742,7 +742,7 @@ for row in rows:
 #
 # ## Run time and versions
 #
-# All cells take about 40 minutes on two cores.
+# All cells take about 70 minutes on two cores.
 
 # %%
 print(versions())

@@ -434,7 +434,7 @@ if full:
 # %% [markdown]
 # ## Run time and versions
 #
-# All cells take about 15 minutes on two cores.
+# All cells take about 10 minutes on two cores.
 
 # %%
 print(versions())
