@@ -477,13 +477,13 @@ def without_wild(track: Floats, name: str) -> tuple[Floats, str]:
 
 def _missed(rows: Ints, track: Floats) -> Floats:
     """By how much places of a track miss the cubic through the four beside each, over its noise."""
-    t, x = rows, track[rows]
-    if len(t) < 5:
-        return np.zeros(len(t))
-    own = np.arange(len(t))[:, None]
-    window = np.clip(own - 2, 0, len(t) - 5) + np.arange(5)
+    if len(rows) < 5:
+        return np.zeros(len(rows))
+    x, own = track[rows], np.arange(len(rows))[:, None]
+    window = np.clip(own - 2, 0, len(rows) - 5) + np.arange(5)
     beside = window[window != own].reshape(-1, 4)
-    away, between = t[beside] - t[own], t[beside][:, :, None] - t[beside][:, None]
+    others = rows[beside]
+    away, between = others - rows[own], others[:, :, None] - others[:, None]
     weights = np.prod(away, axis=1, keepdims=True) / away / np.prod(between + np.eye(4), axis=2)
     missed = x + np.einsum("nj,nji->ni", weights, x[beside])
     return np.linalg.norm(missed, axis=1) / np.sqrt(1 + (weights**2).sum(axis=1))
@@ -926,9 +926,9 @@ def directions(t: Floats, x: Floats, most: float) -> Floats:
         return np.asarray(spread > np.maximum(most * noise, 1e-9 * spread.max()))
 
     axes = np.eye(x.shape[1])
-    if not moves(axes).any():  # all of it is noise
+    if not (along := moves(axes)).any():  # all of it is noise
         return axes
-    axes = axes[moves(axes)]
+    axes = axes[along]
     _, _, own = np.linalg.svd((x - x.mean(axis=0)) @ axes.T, full_matrices=False)
     own = own[moves(own @ axes)]
     if len(own) in (0, len(axes)):
