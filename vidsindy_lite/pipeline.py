@@ -241,7 +241,9 @@ def observe_tracks(
     names = [str(name) for name in check_items("names", called, len(raw), "track")]
     for name, track, camera in zip(names, raw, rig.cameras, strict=True):
         seen = track[np.isfinite(track)]
-        if seen.size and (np.abs(seen) <= 1).all():
+        if not seen.size:
+            raise ValueError(f"tracks: {name} must see the target in some frame, got only NaN rows")
+        if (np.abs(seen) <= 1).all():
             raise ValueError(
                 f"tracks: must be in pixels, got {name} with all places between -1 and 1: if they "
                 f"are shares of the image multiply them by its size, {camera.image_size}"
