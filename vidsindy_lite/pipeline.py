@@ -242,7 +242,7 @@ def observe_tracks(
     for name, track, camera in zip(names, raw, rig.cameras, strict=True):
         seen = track[np.isfinite(track)]
         if not seen.size:
-            raise ValueError(f"tracks: {name} must see the target in some frame, got only NaN rows")
+            raise ValueError(f"{name}: must see the target in some frame, got only NaN rows")
         if (np.abs(seen) <= 1).all():
             raise ValueError(
                 f"tracks: must be in pixels, got {name} with all places between -1 and 1: if they "
