@@ -110,17 +110,20 @@ def test_what_is_on_a_circle_before_three_cameras_has_the_law_of_its_angle(angle
         np.testing.assert_allclose(found.fitted, x, atol=3e-3)
 
 
-@pytest.mark.parametrize("order", ["auto", 2])
-def test_what_is_bound_to_a_plane_has_its_law_there(order):
+@pytest.mark.parametrize(("order", "smooth"), [("auto", 0), (2, 0), ("auto", 1.5)])
+def test_what_is_bound_to_a_plane_has_its_law_there(order, smooth):
     t, aslant = np.arange(240) / 30, np.array([0.6, 0, 0.8])
     x = np.outer(0.3 * np.cos(4 * t), aslant) + np.outer(0.2 * np.sin(5.3 * t), (0, 1, 0))
-    found = vl.discover_from_tracks(*before_three_cameras(x), t, lags="synchronous", order=order)
-    assert found.status == "ok"
+    tracks, rig = before_three_cameras(x)
+    for k, track in enumerate(tracks):  # errors that no smoothing tells from motion
+        track += smooth * np.sin(np.outer(2 + t, [0.7, 1.1]) * (1 + k))
+    found = vl.discover_from_tracks(tracks, rig, t, lags="synchronous", order=order)
+    assert found.status == "ok" or smooth
     said = found.discovery.physics()
     pulls = [float(said[f"spring constant {axis}"].value) for axis in "xy"]
-    np.testing.assert_allclose(sorted(pulls), [16, 28.09], rtol=0.01)
+    np.testing.assert_allclose(sorted(pulls), [16, 28.09], rtol=0.02)
     assert float(found.period.value) == pytest.approx(2 * np.pi / 4, rel=0.01)  # it moves furthest
-    np.testing.assert_allclose(found.fitted, x, atol=5e-3)
+    np.testing.assert_allclose(found.fitted, x, atol=5e-3 + 0.01 * smooth)
 
 
 @given(st.floats(0.5, 30), st.integers(5, 40), st.integers(0, 9))

@@ -564,7 +564,7 @@ def _rig_warnings(
 # ---------------------------------------------------------------------------------------- the law
 
 STILL = 1.5
-"""Spread across a plane or a line, over the noise, up to which a motion in space stays in it."""
+"""Spread across a plane or a line, over the errors of places, up to which a motion stays in it."""
 _OTHER_CLOCK = 1e-3  # share by which given and stated frame rates may differ without a word
 
 
@@ -842,11 +842,13 @@ def _with_law(seen: Observation, names: Sequence[str], law: dict[str, Any]) -> V
     with refusing("law", seen.tracks, names):
         if not moves.any():
             raise ValueError("tracks: must show a target that moves, got one that stands still")
+        left, pixels = np.hstack(seen.residuals), np.hstack(seen.tracks)
+        apart = float(np.sqrt(np.nanmean(left**2) / np.nanvar(pixels, axis=0).mean()))
         x, modes, circle = seen.x[:, moves], seen.systematic[..., moves], None
         if default and seen.targets == 1:
-            found, circle = simplest(seen.t, x, modes, modes, law, STILL)
+            found, circle = simplest(seen.t, x, modes, modes, law, apart)
         elif seen.targets == 1 and law["library"] is None:
-            found = _where_it_moves(seen.t, x, modes, law, STILL)
+            found = _where_it_moves(seen.t, x, modes, law, apart)
         else:
             found = dynamics.discover(seen.t, x, systematic=modes, **law)
     axes = np.eye(len(moves))[moves]
@@ -863,7 +865,7 @@ def _with_law(seen: Observation, names: Sequence[str], law: dict[str, Any]) -> V
 
 
 def simplest(
-    t: Floats, x: Floats, modes: Floats, told: Floats, law: dict[str, Any], most: float
+    t: Floats, x: Floats, modes: Floats, told: Floats, law: dict[str, Any], apart: float = 0.0
 ) -> tuple[Discovery, Round | None]:
     """Of nested laws of a body the simplest that the data bear.
 
@@ -881,7 +883,7 @@ def simplest(
         Those of them that do not bend the paths of linear forces.
     law : dict
         What else `discover` takes.
-    most : float
+    apart : float
         See `directions`.
     """
     rows = np.isfinite(x).all(axis=1)
@@ -889,7 +891,7 @@ def simplest(
     flight = dynamics.homogeneous(t[rows], x[rows], names, modes[:, rows])
     if flight is not None:
         return flight, None
-    found = _where_it_moves(t, x, told, law, most, degree=1, order=2)
+    found = _where_it_moves(t, x, told, law, apart, degree=1, order=2)
     swing = found.swing
     if swing is None:
         return found, None
@@ -903,11 +905,11 @@ def simplest(
 
 
 def _where_it_moves(
-    t: Floats, x: Floats, modes: Floats, law: dict[str, Any], most: float, **bound: int
+    t: Floats, x: Floats, modes: Floats, law: dict[str, Any], apart: float, **bound: int
 ) -> Discovery:
     """The law along the `directions` in which a path moves; ``bound`` holds of one or two."""
     rows = np.isfinite(x).all(axis=1)
-    axes = directions(t[rows], x[rows], most)
+    axes = directions(t[rows], x[rows], apart)
     asked = law | (bound if len(axes) < 3 else {})
     found = dynamics.discover(t, x @ axes.T, systematic=modes @ axes.T, **asked)
     if np.array_equal(axes, np.eye(x.shape[1])):
@@ -916,16 +918,18 @@ def _where_it_moves(
     return replace(found, orientation=own @ axes)
 
 
-def directions(t: Floats, x: Floats, most: float) -> Floats:
+def directions(t: Floats, x: Floats, apart: float = 0.0) -> Floats:
     """Orthonormal directions, (k, d), along which a path, (n, d), moves, and near the axes.
 
-    A spread of ``most`` times the noise is none.
+    A spread of hardly more than their errors is none: these are the noise, or the share of the
+    motion by which views disagree if that is more, as smooth errors are in no estimate of noise.
     """
 
     def moves(axes: Floats) -> Bools:
         along = x @ axes.T
         noise, spread = dynamics.smooth([(t, along)], np.random.default_rng(0)).noise, along.std(0)
-        return np.asarray(spread > np.maximum(most * noise, 1e-9 * spread.max()))
+        errors = np.maximum(noise, max(apart, dynamics.CLOSE) * spread.max())
+        return np.asarray(spread > STILL * errors)
 
     axes = np.eye(x.shape[1])
     if not (along := moves(axes)).any():  # all of it is noise

@@ -45,8 +45,6 @@ HELD = np.deg2rad(10.0)
 """Of the vertical of a picture, where no other is given: a telephone is held upright by hand."""
 FOCAL = 0.75
 """Focal length of a telephone over the longer side of its picture."""
-ASIDE = 5.0
-"""Spread across a line, over the noise, up to which a motion is one along it."""
 TABLES = (".csv", ".tsv", ".txt", ".xml", ".dat")
 """How the names of files end that hold a track."""
 
@@ -92,7 +90,7 @@ class PlaneDiscovery(VideoDiscovery):
         And where that may be how the telephone was held.
         """
         there = np.isfinite(self.x[:, 0])
-        axes = directions(self.t[there], self.x[there, :2], ASIDE)
+        axes = directions(self.t[there], self.x[there, :2])
         off = float(np.arctan2(*np.abs(axes[0])))
         return float(np.rad2deg(off)) if len(axes) == 1 and off > SURE * HELD else 0.0
 
@@ -208,7 +206,7 @@ def discover_from_video(
         # A plane that lies askew bends a path a little as other forces would: laws are told from
         # each other without that.
         if asked["degree"] is None and asked["order"] == "auto":
-            law, circle = simplest(t, x, modes, modes[:1], asked, ASIDE)
+            law, circle = simplest(t, x, modes, modes[:1], asked)
         else:
             law, circle = discover(t, x, systematic=modes[:1], **asked), None
     if law.orientation is not None:

@@ -22,6 +22,7 @@ from .result import Discovery
 from .model import Form
 from .model import runge_kutta_4
 from .library import Function, monomial_exponents, monomials
+from .diagnostics import CLOSE
 from .solver import check_order
 from .frames import ShiftedLaw
 from .homogeneous import homogeneous

@@ -330,7 +330,7 @@ class _Body:
         labels = self.axes if alone else [f" {k + 1}" for k in range(self.m)]
         rates = _swings(-pull, -slowed, alone)
         leaves = rates.real > FAINT * np.abs(rates)
-        swings = (rates.imag > 0) & ~leaves
+        swings = (rates.imag > FAINT * np.abs(rates)) & ~leaves
 
         def rule(law: PolynomialSystem) -> dict[str, Floats]:
             place = self.settled(law, rest)
