@@ -112,8 +112,8 @@ def pair_missed(other: Camera, lines: tuple[Floats, Floats], theirs: Floats) -> 
         solution = np.linalg.pinv(used) @ wanted[..., None]
         missed = np.where(seen, np.abs((design @ solution)[..., 0] - target), np.nan)
         enough = fits.sum(axis=1) > 2 * design.shape[-1]
-        limit = np.nanquantile(np.where(enough[:, None], missed, 0), TRIMMED, axis=1)
-        fits = seen & (missed <= limit[:, None])
+        most = (TRIMMED * np.maximum(seen.sum(axis=1) - 1, 0)).astype(int)
+        fits = seen & (missed <= np.take_along_axis(np.sort(missed), most[:, None], axis=1))
     total = np.sum(np.where(fits, missed, 0) ** 2, axis=1)
     return np.where(enough, np.sqrt(total / np.maximum(fits.sum(axis=1), 1)), np.inf)
 
