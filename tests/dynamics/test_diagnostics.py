@@ -162,9 +162,9 @@ def differing(found):
     return [w.split(" has other coeff")[0] for w in found.warnings if "other coefficients" in w]
 
 
-@pytest.mark.parametrize("noise", [0.03, 0.1])
 @pytest.mark.parametrize(
-    ("stiffness", "told"), [((1, 1, 1.05), ["run 2"]), ((1, 1.12, 1), ["run 1"]), ((1, 1, 1), [])]
+    ("stiffness", "told", "noise"),
+    [((1, 1, 1.05), ["run 2"], 0.03), ((1, 1.12, 1), ["run 1"], 0.1), ((1, 1, 1), [], 0.03)],
 )
 def test_runs_of_different_systems_are_told(stiffness, told, noise):
     assert differing(discover(duffings(*stiffness, noise=noise))) == told

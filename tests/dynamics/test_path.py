@@ -1,13 +1,9 @@
 """The path of laws: a first law, smooth errors, plateaus that compete, and which law persists."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
-from scipy.interpolate import make_interp_spline
 
 from vidsindy_lite.dynamics import path as paths
-from vidsindy_lite.dynamics.bspline import Segment
 from vidsindy_lite.dynamics.model import PolynomialSystem
 from vidsindy_lite.dynamics.path import LARGEST
 from vidsindy_lite.dynamics.solver import discover
@@ -129,19 +125,3 @@ def test_a_plateau_that_leaves_more_than_it_was_said_to_is_passed_over():
     found = discover(t[seen], x[seen], order=1)
     assert found.terms[np.flatnonzero(found.system.support[:, 0])[-1]] == "x^2"
     assert found.noise < 1e-3 * x.std()
-
-
-def test_a_law_carries_both_sides_across_a_gap_where_they_are_blended():
-    """A circle seen from 0 to 2 and, twice as large, from 3 to 6."""
-    law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1}})
-    t = np.linspace(0, 6, 121)
-    x = np.stack([np.sin(t), np.cos(t)], axis=1) * np.where(t < 3, 1, 2)[:, None]
-    segments = [Segment.even(t[s], x[s], 0.2, 0) for s in (t <= 2, t >= 3)]
-    problem = SimpleNamespace(trajectories=[(t, x)], spacing=0.2, jumps=[np.zeros(0)])
-    splines = [make_interp_spline(s.t, s.x, 3) for s in segments]
-    ((joined,), (curve,)) = paths.join(problem, segments, splines, law, [(0, 2.0)])
-    assert len(joined.t) == 121  # samples inside the gap, if any, come back
-    inside = np.linspace(2, 3, 30)
-    exact = (inside - 1)[:, None] * np.stack([np.sin(inside), np.cos(inside)], axis=1)
-    np.testing.assert_allclose(curve(inside), exact, atol=1e-5)
-    np.testing.assert_allclose(curve([1.5, 4.5]), [splines[0](1.5), splines[1](4.5)])

@@ -137,7 +137,7 @@ def right_terms(law):
 
 @pytest.fixture(scope="module")
 def swung():
-    return vl.discover(FRAMES[::2], swung_bob(1.5, 0.005)[::2])
+    return vl.discover(FRAMES[::4], swung_bob(1.5, 0.005)[::4])
 
 
 def test_a_bob_in_space_has_the_law_of_its_angle(swung):

@@ -5,11 +5,13 @@ Its standard errors, too, and the intervals of absent terms.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import BSpline
+from scipy.interpolate import BSpline, make_interp_spline
 
 from ..arrays import Floats, Ints
 from .bspline import DEGREE
@@ -17,6 +19,7 @@ from .collocation import Fit, Linearisation, State
 from .data import Units
 from .l0 import inverse, newcomers
 from .library import divides, shift_generators, shift_matrix
+from .model import runge_kutta_4
 from .noise import residual_noise
 from .problem import Problem
 from .result import Discovery, History, Path
@@ -113,7 +116,8 @@ def infer(
         history=tuple(history.steps),
         absent=intervals(problem, fit.state, model, tolerated),
         curves=tuple(
-            BSpline(s.t * units.time, s.c * units.scale + units.centre, DEGREE) for s in fit.splines
+            BSpline(s.t * units.time, s.c * units.scale + units.centre, DEGREE)
+            for s in (*fit.splines, *across_gaps(problem, fit))
         ),
     )
 
@@ -140,6 +144,29 @@ def _in_both_frames(
         "native_covariance": covariance[:size, :size],
         "offset_errors": np.sqrt(np.diag(covariance)[size:]),
     }
+
+
+def across_gaps(problem: Problem, fit: Fit, most: float = 0.1) -> Iterator[BSpline]:
+    """Curves across the gaps in which a law leads from each side to the other.
+
+    It is integrated from both sides, and the two paths are blended linearly; where they are apart
+    by ``most`` of the spread, or an input jumps nobody knows when, the gap stays open.
+    """
+    law, onward = problem.law(fit.state).shift(fit.state.offset), np.array([[1.0], [-1.0]])
+    pieces = zip(fit.collocation.segments, fit.splines, strict=True)
+    for (before, left), (after, right) in pairwise(pieces):
+        low, high = left.t[-1], right.t[0]
+        jumps = ((problem.unsure[:, 0] < high) & (low < problem.unsure[:, 1])).any()
+        if before.trajectory != after.trajectory or jumps:
+            continue
+        t = np.linspace(low, high, 4 + 4 * int((high - low) / problem.spacing))
+        with np.errstate(over="ignore", invalid="ignore"):
+            there, back = runge_kutta_4(
+                lambda x: onward * law(x), t, np.array([left(low), right(high)]), substeps=1
+            ).swapaxes(0, 1)
+        share = np.linspace(0, 1, len(t))[:, None]
+        if np.abs(there - back[::-1]).max() < most:
+            yield make_interp_spline(t, (1 - share) * there + share * back[::-1])
 
 
 def _covariance(units: Units, fit: Fit, model: Linearisation) -> Floats:

@@ -19,20 +19,16 @@ path around a law leads to that law.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
 
-from ..arrays import Bools, Floats
-from .bspline import Segment
+from ..arrays import Bools
 from .collocation import Fit, State, Status
 from .frames import Origin, cheapest, closed, free_offsets, with_fewer_axes
 from .l0 import NEGLIGIBLE, STRONG, inverse, minimiser, subset_search
-from .model import PolynomialSystem, runge_kutta_4
 from .noise import (
     CONSISTENT,
     TOLERATED,
@@ -227,30 +223,24 @@ def persistent(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path,
     persists : bool
         Whether the path leads to the law; else it is the last to which one led.
     """
-    open_gaps = gaps(fit.collocation.segments, problem.unsure)
-    crossed = not open_gaps
     for k in range(ROUNDS):
-        coarse = k > 0 or not crossed or not near(problem, fit, TOLERATED)
+        coarse = k > 0 or not near(problem, fit, TOLERATED)
         fit = at_own_errors(problem, fit) if coarse else polish(problem, fit, history)
         path = follow(problem, fit)
         if k == 0:
             path = deepest(problem, path, history)
-        if crossed and coarse and has_terms(fit, path.widest()):
-            fit, coarse = polish(problem, fit, history), False
+        if coarse and has_terms(fit, path.widest()):
+            fit = polish(problem, fit, history)
             path = follow(problem, fit)
-        leads = has_terms(fit, path.widest())
-        if leads and crossed:
+        if has_terms(fit, path.widest()):
             return fit, path, fit.status is Status.CONVERGED
-        if leads or not (crossed or k < ROUNDS // 2):  # without what is in a gap, none may persist
-            fit, crossed = bridged(problem, fit, open_gaps), True
-        else:
-            other = refit(problem, path, history)
-            if other.status is not Status.CONVERGED and fit.status is Status.CONVERGED:
-                break  # what cannot be fitted is no law
-            fit = other
+        other = refit(problem, path, history)
+        if other.status is not Status.CONVERGED and fit.status is Status.CONVERGED:
+            break  # what cannot be fitted is no law
+        fit = other
         if not history.another():
             break
-    fit = polish(problem, fit if crossed else bridged(problem, fit, open_gaps), history)
+    fit = polish(problem, fit, history)
     path = follow(problem, fit)
     return fit, path, fit.status is Status.CONVERGED and has_terms(fit, path.widest())
 
@@ -385,29 +375,6 @@ def polish(problem: Problem, fit: Fit, history: History, most: int = 4) -> Fit:
     return fit
 
 
-def bridged(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
-    """The fit with the law across these gaps, or those of them that the data allow.
-
-    A smoothing spline crosses a gap on the wrong branch, so until here the physics was cut at gaps.
-    The law is integrated across all, and fitted again with the physics enforced there; a group
-    whose bridges spoil the fit is halved, down to single gaps.
-    """
-    law = problem.law(fit.state).shift(fit.state.offset)
-    joined, curves = join(problem, fit.collocation.segments, fit.splines, law, group)
-    whole = problem.collocation(joined)
-    start = replace(fit.state, control_points=fit_curves(whole, curves))
-    trial = tightened(problem, whole, start)
-    # A bridge takes away the freedom of one initial condition: so much may the fit lose.
-    freedom = problem.d * len(group) + (whole.counts - fit.collocation.counts).sum()
-    loss = trial.collocation.objective(trial.state) - fit.collocation.objective(fit.state)
-    if loss < freedom + 4 * np.sqrt(2 * freedom):
-        return replace(fit, state=trial.state, collocation=trial.collocation)
-    if len(group) > 1:
-        for half in (group[: len(group) // 2], group[len(group) // 2 :]):
-            fit = bridged(problem, fit, half)
-    return fit
-
-
 def information_criterion(problem: Problem, fit: Fit) -> float:
     """What a law costs whose noise is its own: n log variance, and the penalty of its terms.
 
@@ -420,81 +387,3 @@ def information_criterion(problem: Problem, fit: Fit) -> float:
     foretold = np.hypot(problem.noise, problem.process_noise)
     single = foretold if problem.has_process_noise else residual_noise(fit)
     return float(counts[seen] @ np.log(single[seen] ** 2)) + problem.penalty(fit.state)
-
-
-# --------------------------------------------------------------------------------------------------
-# Curves across gaps in the data, by integrating a law from both sides.
-#
-# A smoothing spline crosses a gap on whatever branch is smooth, not on the one that the motion
-# took. A law found from the stretches between the gaps tells which.
-
-Gap = tuple[int, float]
-"""A gap is named by its trajectory and the time of the last sample before it."""
-
-
-def gaps(segments: Sequence[Segment], unsure: Floats) -> list[Gap]:
-    """The gaps between segments of the same trajectory, shortest first.
-
-    But for those with one of the ``unsure`` times (k, 2), between which no law tells what happens.
-    """
-    low, high = unsure.T
-    lengths = {
-        (left.trajectory, left.t[-1]): right.t[0] - left.t[-1]
-        for left, right in zip(segments[:-1], segments[1:], strict=True)
-        if left.trajectory == right.trajectory
-        and not ((low < right.t[0]) & (left.t[-1] < high)).any()
-    }
-    return sorted(lengths, key=lengths.__getitem__)
-
-
-def cross(law: PolynomialSystem, left: BSpline, right: BSpline, spacing: float) -> BSpline:
-    """The motion from the end of a curve to where the next one begins.
-
-    The law is integrated from both sides, and the two are blended linearly.
-    """
-    low, high = left.t[-1], right.t[0]
-    t, ends = np.linspace(low, high, 4 + 4 * int((high - low) / spacing)), [left(low), right(high)]
-    onward = np.array([[1.0], [-1.0]])
-    with np.errstate(over="ignore", invalid="ignore"):
-        paths = runge_kutta_4(lambda x: onward * law(x), t, np.array(ends), substeps=1)
-    # Where the law blows up the curve stays at the end: the fit will refuse the bridge.
-    paths = np.where(np.isfinite(paths).all(axis=(0, 2), keepdims=True), paths, ends)
-    share = np.linspace(0, 1, len(t))[:, None]
-    return make_interp_spline(t, (1 - share) * paths[:, 0] + share * paths[::-1, 1])
-
-
-def join(
-    problem: Problem, segments: Sequence[Segment], splines: Sequence[BSpline],
-    law: PolynomialSystem, bridged: Sequence[Gap],
-) -> tuple[list[Segment], list[Callable[[Floats], Floats]]]:  # fmt: skip
-    """Join segments across the named gaps, with a first curve for each.
-
-    Parameters
-    ----------
-    problem : Problem
-        With all data, also samples that were too few to make a segment of their own.
-    segments, splines
-        The present pieces and their fitted curves.
-    law : PolynomialSystem
-        In the frame of the data.
-    bridged : sequence of Gap
-        Which gaps to cross.
-    """
-    joined: list[Segment] = []
-    curves: list[list[BSpline]] = []
-    for segment, spline in zip(segments, splines, strict=True):
-        if joined and (joined[-1].trajectory, joined[-1].t[-1]) in bridged:
-            (t, x), k = problem.trajectories[segment.trajectory], segment.trajectory
-            inside = (t >= joined[-1].t[0]) & (t <= segment.t[-1])
-            joined[-1] = Segment.even(t[inside], x[inside], problem.spacing, k, problem.jumps[k])
-            curves[-1] += [cross(law, curves[-1][-1], spline, problem.spacing), spline]
-        else:
-            joined.append(segment)
-            curves.append([spline])
-    return joined, [partial(_end_to_end, pieces) for pieces in curves]
-
-
-def _end_to_end(pieces: Sequence[BSpline], t: Floats) -> Floats:
-    """Curves one after the other at increasing times, (n,)."""
-    parts = np.split(t, np.searchsorted(t, [piece.t[-1] for piece in pieces[:-1]], side="right"))
-    return np.concatenate([piece(part) for piece, part in zip(pieces, parts, strict=True)])
