@@ -147,12 +147,12 @@ def _in_both_frames(
 
 
 def across_gaps(problem: Problem, fit: Fit, most: float = 0.1) -> Iterator[BSpline]:
-    """Curves across the gaps in which a law leads from each side to the other.
+    """Curves across the gaps in which a law leads from one side to the other.
 
-    It is integrated from both sides, and the two paths are blended linearly; where they are apart
-    by ``most`` of the spread, or an input jumps nobody knows when, the gap stays open.
+    It is integrated from where the one ends, and by how much it misses the other is spread over the
+    way; where that is ``most`` of the spread, or an input jumps nobody knows when, the gap is open.
     """
-    law, onward = problem.law(fit.state).shift(fit.state.offset), np.array([[1.0], [-1.0]])
+    law = problem.law(fit.state).shift(fit.state.offset)
     pieces = zip(fit.collocation.segments, fit.splines, strict=True)
     for (before, left), (after, right) in pairwise(pieces):
         low, high = left.t[-1], right.t[0]
@@ -161,12 +161,10 @@ def across_gaps(problem: Problem, fit: Fit, most: float = 0.1) -> Iterator[BSpli
             continue
         t = np.linspace(low, high, 4 + 4 * int((high - low) / problem.spacing))
         with np.errstate(over="ignore", invalid="ignore"):
-            there, back = runge_kutta_4(
-                lambda x: onward * law(x), t, np.array([left(low), right(high)]), substeps=1
-            ).swapaxes(0, 1)
-        share = np.linspace(0, 1, len(t))[:, None]
-        if np.abs(there - back[::-1]).max() < most:
-            yield make_interp_spline(t, (1 - share) * there + share * back[::-1])
+            path = runge_kutta_4(law, t, left(low), substeps=1)
+        missed = right(high) - path[-1]
+        if np.abs(missed).max() < most:
+            yield make_interp_spline(t, path + np.linspace(0, 1, len(t))[:, None] * missed)
 
 
 def _covariance(units: Units, fit: Fit, model: Linearisation) -> Floats:
