@@ -36,10 +36,9 @@ def subset_search(
 
     The function is ``(c - p)' S (c - p) - 2 g' (c - p)``: what Gauss-Newton knows around ``p``.
     Takes the best of all single drops, adds and swaps until none helps, once from the given
-    support and once from nothing; then asks of every entry left out whether it lets others go
-    that it does not pay for by itself (where a conserved quantity ties terms together, only that
-    leads on). Unlike a threshold it weighs a term by what the fit loses with it, re-fitting all
-    others, so it survives collinear columns and coefficients of very different size.
+    support and once from nothing. Unlike a threshold it weighs a term by what the fit loses with
+    it, re-fitting all others, so it survives collinear columns and coefficients of very different
+    size.
 
     Parameters
     ----------
@@ -205,12 +204,9 @@ class _Quadratic:
 
 
 def _search(model: _Quadratic, start: Bools) -> _Fit:
-    """The lowest value from a support and from nothing, and through newcomers from there."""
+    """The lowest value from a support and from nothing."""
     starts = (start, np.isneginf(model.penalty))
-    best = min((_descend(model, first) for first in starts), key=model.value)
-    while (deeper := _through_newcomer(model, best)) is not None:
-        best = deeper
-    return best
+    return min((_descend(model, first) for first in starts), key=model.value)
 
 
 def _descend(model: _Quadratic, start: Bools) -> _Fit:
@@ -225,23 +221,6 @@ def _descend(model: _Quadratic, start: Bools) -> _Fit:
         if not model.value(fit) < model.value(best) - NEGLIGIBLE:
             return best
         best = fit
-
-
-def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
-    """A lower value reached by forcing one entry in, which may let others go.
-
-    Of those with which one of the others is not worth its penalty any more, as an update of rank
-    one tells.
-    """
-    room, left = np.maximum(best.room, COLLINEAR)[:, None], best.left[best.outside, None]
-    fitted = best.fitted - best.response * (left / room)
-    lost = fitted**2 / (best.spread + best.response**2 / room)
-    lets_go = (lost < model.penalty[best.inside]).any(axis=1)
-    for entry in best.outside[lets_go & ~np.isposinf(model.penalty[best.outside])].tolist():
-        value, support = _forced(model, best.support, entry)
-        if value < model.value(best) - NEGLIGIBLE:
-            return _descend(model, support)
-    return None
 
 
 def _forced(model: _Quadratic, support: Bools, entry: int) -> tuple[float, Bools]:

@@ -233,7 +233,8 @@ def persistent(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path,
         if has_terms(fit, path.widest()):
             return fit, path, fit.status is Status.CONVERGED
         other = refit(problem, path, history)
-        if other.status is not Status.CONVERGED and fit.status is Status.CONVERGED:
+        stays = fit.status is Status.CONVERGED
+        if other is None or (stays and other.status is not Status.CONVERGED):
             break  # what cannot be fitted is no law
         fit = other
         if not history.another():
@@ -302,40 +303,24 @@ def at_own_errors(problem: Problem, fit: Fit) -> Fit:
     return fit
 
 
-def refit(problem: Problem, path: Path, history: History, most: int = 4) -> Fit:
-    """The law of the widest plateaus of a path; where it is not what they promise, of the next.
+def refit(problem: Problem, path: Path, history: History) -> Fit | None:
+    """The law of the widest plateaus of a path, fitted and framed where they begin.
 
-    A plateau is told by the quadratic model around another law: fitted, its own may have a pole, or
-    miss the data by more than is tolerated where the plateau begins. At ``most`` so many choices of
-    plateaus are fitted.
+    A plateau is told by the quadratic model around another law: none, if its own has a pole, or
+    misses the data by more than is tolerated where the plateau begins.
     """
-    ranked = path.ranked()
-    for _ in range(most):
-        goal = [plateaus[0] for plateaus in ranked]
-        highest = max(goal, key=lambda plateau: plateau.low)
-        tolerated = max(highest.low / path.own, 1.0)
-        tolerant = replace(problem, noise=errors_left(problem, path.fit) * tolerated)
-        fit = _refitted(tolerant, path, goal, history)
-        promised = CONSISTENT * tolerant.noise
-        if np.isfinite(fit.criterion) and (residual_noise(fit) <= promised).all():
-            return fit
-        ranked[highest.equation].remove(highest)
-        if not ranked[highest.equation]:
-            break
-    return path.fit
-
-
-def _refitted(tolerant: Problem, path: Path, goal: Sequence[Plateau], history: History) -> Fit:
-    """The law of these plateaus, fitted and framed where they begin."""
-    fit = path.fit
-    active = fit.state.whole(np.stack([plateau.terms for plateau in goal], axis=1))
-    collocation = replace(fit.collocation, data_weights=tolerant.noise**-2)
-    trial = tightened(tolerant, collocation, _restricted(path, active))
-    trial = replace(trial, criterion=tolerant.criterion(trial.collocation, trial.state))
-    if not np.isfinite(trial.criterion):
-        return trial
-    history.add("another law of the path", tolerant, trial, FINAL_WEIGHT)
-    return framed(tolerant, trial, history)
+    goal = path.widest()
+    tolerated = max(1.0, *(plateau.low / path.own for plateau in goal))
+    tolerant = replace(problem, noise=errors_left(problem, path.fit) * tolerated)
+    active = path.fit.state.whole(np.stack([plateau.terms for plateau in goal], axis=1))
+    collocation = replace(path.fit.collocation, data_weights=tolerant.noise**-2)
+    fit = tightened(tolerant, collocation, _restricted(path, active))
+    fit = replace(fit, criterion=tolerant.criterion(fit.collocation, fit.state))
+    if not np.isfinite(fit.criterion):
+        return None
+    history.add("another law of the path", tolerant, fit, FINAL_WEIGHT)
+    fit = framed(tolerant, fit, history)
+    return fit if (residual_noise(fit) <= CONSISTENT * tolerant.noise).all() else None
 
 
 def _restricted(path: Path, active: Bools) -> State:

@@ -96,16 +96,10 @@ class Path:
         """How far a plateau reaches beyond the errors there are, in decades."""
         return max(replace(plateau, low=max(plateau.low, self.own)).decades, 0.0)
 
-    def ranked(self) -> list[list[Plateau]]:
-        """The plateaus of each equation that begin at or below the level, the widest first."""
-        return [
-            sorted((p for p in path if p.low <= self.level), key=lambda p: -p.decades)
-            for path in self.plateaus
-        ]
-
     def widest(self) -> list[Plateau]:
         """The widest plateau of each equation, of those that begin at or below the level."""
-        return [ranked[0] for ranked in self.ranked()]
+        near = ((p for p in path if p.low <= self.level) for path in self.plateaus)
+        return [max(plateaus, key=lambda p: p.decades) for plateaus in near]
 
     def of(self, active: Bools) -> list[Plateau]:
         """The lowest plateau with the terms of each equation of a law, or the lowest of all."""
