@@ -8,6 +8,7 @@ axis off the data's origin is one more column of the L0 search, with a penalty o
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -86,6 +87,13 @@ def free_offsets(problem: Problem, state: State, movable: Bools) -> list[Origin]
         if inside and moved.any() and not known:
             found.append((origin, state.moving | moved))
     return found
+
+
+def with_fewer_axes(problem: Problem, origin: Floats) -> list[Origin]:
+    """An origin, and the same with some of its axes at the data's, where they cost nothing."""
+    given = problem.origin
+    masks = itertools.product(*((True, False) if free else (False,) for free in origin != given))
+    return [(np.where(mask, origin, given), np.array(mask)) for mask in masks]
 
 
 def closed(problem: Problem, fit: Fit) -> Fit:

@@ -27,7 +27,7 @@ import numpy as np
 
 from ..arrays import Bools
 from .collocation import Fit, State, Status
-from .frames import Origin, cheapest, closed, free_offsets
+from .frames import Origin, cheapest, closed, free_offsets, with_fewer_axes
 from .l0 import NEGLIGIBLE, STRONG, inverse, minimiser, subset_search
 from .noise import (
     CONSISTENT,
@@ -167,7 +167,7 @@ def select(problem: Problem, start: Fit, weight: float, stage: str, history: His
 
 
 def framed(problem: Problem, fit: Fit, history: History) -> Fit:
-    """The law with its origin off the data's, while the criterion falls.
+    """The law with its origin off the data's, or back, while the criterion falls.
 
     Axes move together, to where a term vanishes; only if that does not pay, one by one.
     """
@@ -175,7 +175,9 @@ def framed(problem: Problem, fit: Fit, history: History) -> Fit:
     for _ in range(LONGEST_SEARCH):
         if fit.status is not Status.CONVERGED or history.over:
             break  # what has not converged is no law whose terms could tell
-        trial = _moved(problem, fit, free_offsets(problem, fit.state, movable), history)
+        together = free_offsets(problem, fit.state, movable)
+        fewer = with_fewer_axes(problem, fit.state.offset)
+        trial = _moved(problem, fit, [*together, *fewer], history)
         if not trial.criterion < fit.criterion:
             alone = [free_offsets(problem, fit.state, a) for a in np.diag(movable)[movable]]
             trial = _moved(problem, fit, [origin for one in alone for origin in one], history)
