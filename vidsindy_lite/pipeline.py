@@ -589,7 +589,7 @@ class VideoDiscovery(Observation):
     def fitted(self) -> Floats:
         """The path that obeys the law, in the shape of ``x`` and with a fraction of its noise.
 
-        In gaps, too, that the law bridges; NaN elsewhere.
+        In gaps, too, across which the law leads; NaN elsewhere.
         """
         law = self.discovery
         m = law.system.states // law.system.order

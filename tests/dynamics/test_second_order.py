@@ -72,6 +72,8 @@ def test_an_origin_off_that_of_the_data_is_found_and_gaps_are_crossed():
     assert abs(found.offset[0] - 7) < 4 * found.offset_errors[0]
     assert found.offset[1] == 0  # that of a velocity is known
     assert np.isfinite(found.curve(t)).all()
+    assert len(found.curves) == len(found.physics().energy) == 3  # no energy of what is supposed
+    assert "energy rises" not in str(found.physics())
 
 
 def drag(_, v):

@@ -105,6 +105,10 @@ def infer(
     penalties = np.where(weighed, KEPT, tolerable)
     noise = problem.noise if problem.has_process_noise else residual_noise(fit)
     span = sum(np.ptp(s.breakpoints) for s in collocation.segments) / len(collocation.grid.x)
+
+    def told(curve: BSpline) -> BSpline:
+        return BSpline(curve.t * units.time, curve.c * units.scale + units.centre, DEGREE)
+
     return Discovery(
         **_in_both_frames(problem, fit, model, offset, penalties),
         native=form.law(coefficients + form.known),
@@ -115,10 +119,8 @@ def infer(
         path=path.plateaus,
         history=tuple(history.steps),
         absent=intervals(problem, fit.state, model, tolerated),
-        curves=tuple(
-            BSpline(s.t * units.time, s.c * units.scale + units.centre, DEGREE)
-            for s in (*fit.splines, *across_gaps(problem, fit))
-        ),
+        curves=tuple(map(told, fit.splines)),
+        across=tuple(map(told, across_gaps(problem, fit))),
     )
 
 

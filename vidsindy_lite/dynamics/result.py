@@ -259,6 +259,8 @@ class Discovery:
     swing : Swing, optional
         Where positions are bound to a circle, and no law of theirs is beyond doubt: the circle, as
         ``swing.circle``, and the law of the angle on it, ``swing.law``. None elsewhere.
+    across : tuple of scipy.interpolate.BSpline
+        Curves across the gaps between stretches in which the law leads from one side to the other.
     """
 
     system: PolynomialSystem
@@ -277,6 +279,7 @@ class Discovery:
     note: str = ""
     orientation: Floats | None = None
     swing: Swing | None = None
+    across: tuple[BSpline, ...] = ()
 
     @property
     def status(self) -> str:
@@ -339,8 +342,11 @@ class Discovery:
         return "\n".join(lines)
 
     def curve(self, t: Floats) -> Floats:
-        """The fitted curve, shape (n, d), in the frame of the data; NaN outside the stretches."""
-        return of_pieces(self.curves, check_array("t", t))
+        """The fitted curve, shape (n, d), in the frame of the data.
+
+        In gaps, too, across which the law leads; NaN elsewhere.
+        """
+        return of_pieces((*self.curves, *self.across), check_array("t", t))
 
     def predict(self, x: Floats) -> Floats:
         """Time derivative at states, shape (n, d) or (d,), in units of the data.
