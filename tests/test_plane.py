@@ -9,7 +9,7 @@ from helpers import real
 from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
-from vidsindy_lite import plane
+from vidsindy_lite import pipeline, plane
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.dynamics import homogeneous
 from vidsindy_lite.vision import Track, VideoInfo
@@ -196,11 +196,12 @@ def test_the_error_of_g_does_not_hang_on_the_order_of_the_marks(monkeypatch):
     assert one == pytest.approx(other, rel=1e-6)
 
 
-def test_a_spring_on_a_line_has_a_period(monkeypatch):
+@pytest.mark.parametrize("order", ["auto", 2])
+def test_a_spring_on_a_line_has_a_period(monkeypatch, order):
     t = np.arange(72) / 24
     x = (0.2 * np.exp(-0.1 * t) * np.cos(5.3 * t))[:, None] * [0.03, 1]
     filmed(monkeypatch, pixels_of(noisy(x, 0)), fps=24.0)
-    found = vl.discover_from_video("spring.mp4", STICK)
+    found = vl.discover_from_video("spring.mp4", STICK, order=order)
     said = found.discovery.physics()
     assert found.status == "ok"
     assert found.discovery.system.support.sum() == 1 + 3  # x' = vx, x'' = rest, spring, drag
@@ -236,11 +237,8 @@ def test_a_swing_is_on_a_circle(monkeypatch, samples, drag):
 
 def test_a_wheel_turns_by_the_law_of_its_angle(monkeypatch):
     t = np.arange(120) / 30
-    for term, angle in {
-        "1": 6 * t - 0.6 * t**2,
-        "vangle": -20 * np.exp(-0.3 * t),
-        "": 6 * t,
-    }.items():
+    angles = {"1": 6 * t - 0.6 * t**2, "vangle": -20 * np.exp(-0.3 * t), "": 6 * t}
+    for term, angle in angles.items():
         turned = 0.4 * np.column_stack([np.cos(angle), np.sin(angle)])
         filmed(monkeypatch, pixels_of(noisy(turned, 0)))
         found = vl.discover_from_video("wheel.mp4", STICK)
@@ -338,7 +336,7 @@ def test_an_interruption_keeps_the_track(monkeypatch, tmp_path, capsys):
 
     film = vl.write_video(tmp_path / "a.mov", np.full((34, 90, 120, 3), 90, np.uint8))
     filmed(monkeypatch, pixels_of(flight()[1]))
-    monkeypatch.setattr(plane, "simplest", interrupted)
+    monkeypatch.setattr(pipeline, "simplest", interrupted)
     folder = tmp_path / "law"
     assert main(["discover", str(film), "--out", str(folder)]) == 130
     kept = f"stopped; the tracks are kept beside {folder / 'report.html'}"

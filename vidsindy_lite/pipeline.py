@@ -596,8 +596,7 @@ class VideoDiscovery(Observation):
         if self.circle is not None:
             angle = law.curve(self.t)[:, :1]
             away = np.hstack([np.cos(angle), np.sin(angle)]) @ self.circle.axes
-            path = self.circle.centre + self.circle.radius * away
-            return path @ np.eye(path.shape[1], self.x.shape[1])
+            return self.circle.centre + self.circle.radius * away
         turn = np.eye(self.x.shape[1])[:m] if law.orientation is None else law.orientation
         still = np.nanmean(self.x - self.x @ turn.T @ turn, axis=0)  # of what the law does not move
         return law.curve(self.t)[:, :m] @ turn + still
@@ -689,7 +688,7 @@ def discover_from_videos(
         paths, rig, t, lags=lags, detector=detector, hints=hints, targets=targets,
         progress=progress,
     )  # fmt: skip
-    return _with_law(seen, [Path(path).name for path in paths], law)
+    return with_law(seen, [Path(path).name for path in paths], law)
 
 
 def discover_from_tracks(
@@ -747,7 +746,7 @@ def discover_from_tracks(
     seen = observe_tracks(pixels, rig, times, lags=lags, names=names, progress=progress)
     doubts = [*(warning for track in read for warning in track.warnings), *doubts]
     seen = replace(seen, warnings=(*seen.warnings, *doubts))
-    return _with_law(seen, names, law)
+    return with_law(seen, names, law)
 
 
 def law_options(
@@ -829,10 +828,23 @@ def times_of(
     return [np.arange(len(track.pixels)) / given for track in read], doubts
 
 
-def _with_law(seen: Observation, names: Sequence[str], law: dict[str, Any]) -> VideoDiscovery:
+def with_law(
+    seen: Observation, names: Sequence[str], law: dict[str, Any], straight: int | None = None
+) -> VideoDiscovery:
     """An observation with the law that it obeys, given what else `discover` takes.
 
     In a frame that is any affine map of space, the default is a law that is linear in any other.
+
+    Parameters
+    ----------
+    seen : Observation
+    names : sequence of str
+        What messages call the tracks.
+    law : dict
+        See `law_options`.
+    straight : int, optional
+        How many of the systematic errors, the first ones, do not bend the paths of linear forces:
+        laws are told from each other with these alone. By default all.
     """
     default = all(law[name] in (None, "auto") for name in ("degree", "library", "order"))
     if default and isinstance(seen.rig.cameras[0], cameras.AffineCamera):
@@ -843,25 +855,30 @@ def _with_law(seen: Observation, names: Sequence[str], law: dict[str, Any]) -> V
         if not moves.any():
             raise ValueError("tracks: must show a target that moves, got one that stands still")
         left, pixels = np.hstack(seen.residuals), np.hstack(seen.tracks)
-        apart = float(np.sqrt(np.nanmean(left**2) / np.nanvar(pixels, axis=0).mean()))
+        left = left[np.isfinite(left)]  # none of one camera
+        share = (left @ left) / max(len(left), 1) / np.nanvar(pixels, axis=0).mean()
+        apart = float(np.sqrt(share))
         x, modes, circle = seen.x[:, moves], seen.systematic[..., moves], None
+        told = modes[:straight]
         if default and seen.targets == 1:
-            found, circle = simplest(seen.t, x, modes, modes, law, apart)
+            found, circle = simplest(seen.t, x, modes, told, law, apart)
         elif seen.targets == 1 and law["library"] is None:
-            found = _where_it_moves(seen.t, x, modes, law, apart)
+            found = _where_it_moves(seen.t, x, told, law, apart)
         else:
-            found = dynamics.discover(seen.t, x, systematic=modes, **law)
+            found = dynamics.discover(seen.t, x, systematic=told, **law)
     axes = np.eye(len(moves))[moves]
     if circle is not None:
-        circle = replace(circle, centre=circle.centre @ axes, axes=circle.axes @ axes)
+        spread = axes.T @ circle.centre_covariance @ axes
+        centre, around = circle.centre @ axes, circle.axes @ axes
+        circle = replace(circle, centre=centre, centre_covariance=spread, axes=around)
     elif found.orientation is not None:
         found = replace(found, orientation=found.orientation @ axes)
     elif not moves[: len(axes)].all():  # else they are the first, as a law's are
         found = replace(found, orientation=axes)
     # Who keeps the law alone keeps the doubts about what it was found in.
     found = replace(found, warnings=(*seen.warnings, *found.warnings))
-    told = vars(seen) | {"warnings": found.warnings}
-    return VideoDiscovery(**told, discovery=found, circle=circle)
+    said = vars(seen) | {"warnings": found.warnings}
+    return VideoDiscovery(**said, discovery=found, circle=circle)
 
 
 def simplest(

@@ -18,17 +18,17 @@ import numpy as np
 from .arrays import Floats
 from .cameras import Lags, OrthographicCamera, Rig
 from .checks import check_array, check_number, check_path, check_positive, check_vector, shown
-from .dynamics import Quantity, discover
+from .dynamics import Quantity
 from .pipeline import (
+    Observation,
     VideoDiscovery,
     check_found,
     directions,
     law_options,
     noted,
-    refusing,
-    simplest,
     times_of,
     tracked,
+    with_law,
     without_wild,
 )
 from .vision import Hint, check_detector, frame_clock, read_tracks, video_info
@@ -47,6 +47,8 @@ FOCAL = 0.75
 """Focal length of a telephone over the longer side of its picture."""
 TABLES = (".csv", ".tsv", ".txt", ".xml", ".dat")
 """How the names of files end that hold a track."""
+SPACE = np.eye(2, 3)
+"""From places in the plane, (n, 2), to the same in space, (n, 3)."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -188,7 +190,7 @@ def discover_from_video(
     middle, centre = marks.mean(axis=0), (np.array(size) - 1) / 2
     across = complex(*np.diff(mapped(to_plane, middle + [[0.0, 0], [1, 0]]), axis=0)[0])
     camera = PlaneCamera(
-        homography=to_plane, position=_in_space(mapped(to_plane, centre[None]))[0],
+        homography=to_plane, position=mapped(to_plane, centre[None])[0] @ SPACE,
         normal=np.array([0, 0, 1]), scale=abs(across), angle=-float(np.angle(across)),
         scale_error=error, image_size=size,
     )  # fmt: skip
@@ -202,32 +204,24 @@ def discover_from_video(
     x = mapped(to_plane, pixels)
     known = slice(3 if corners is None else 1) if measured else slice(0)
     modes = np.stack([error * x, *_tilts(camera, pixels, middle)])[known]
-    with refusing("law", [pixels], [name]):
-        # A plane that lies askew bends a path a little as other forces would: laws are told from
-        # each other without that.
-        if asked["degree"] is None and asked["order"] == "auto":
-            law, circle = simplest(t, x, modes, modes[:1], asked)
-        else:
-            law, circle = discover(t, x, systematic=modes[:1], **asked), None
-    if law.orientation is not None:
-        law = replace(law, orientation=np.pad(law.orientation, ((0, 0), (0, 1))))
-    found = PlaneDiscovery(
+    seen = Observation(
         tracks=(pixels,), rig=rig, lags=Lags(np.zeros(1), np.ones(1), np.zeros(1), 0.0),
-        t=t, x=_in_space(x), systematic=np.pad(modes, ((0, 0), (0, 0), (0, 1))),
-        warnings=(), discovery=law, unit=unit, circle=circle,
+        t=t, x=x @ SPACE, systematic=modes @ SPACE, warnings=tuple(warnings),
     )  # fmt: skip
+    # A plane that lies askew bends a path a little as other forces would.
+    found = PlaneDiscovery(**vars(with_law(seen, [name], asked, straight=1)), unit=unit)
     if found.leaning:
         borne = (
             f"{found.leaning:.0f} degrees off the vertical: something bears it, its pull is no g"
         )
         found = replace(found, rig=noted(rig, f"along a line {borne}"))
     contradicted = _contradicted(found, up is not None or corners is not None, corners is None)
-    if law.warnings and frames is None:
+    if found.warnings != seen.warnings and frames is None:
         contradicted.append(
             "frames: all were taken to be of one motion: if it begins in a hand or ends on the "
             "ground, give the first and the last frame that count"
         )
-    law = replace(law, warnings=(*warnings, *law.warnings, *contradicted))
+    law = replace(found.discovery, warnings=(*found.warnings, *contradicted))
     return replace(found, warnings=law.warnings, discovery=law)
 
 
@@ -275,11 +269,6 @@ def _between(frames: Sequence[int], pixels: Floats, start: int) -> Floats:
             f"{start} to {start + len(pixels) - 1}, got {first:g}, {last:g}"
         )
     return np.where((number >= first) & (number <= last), pixels, np.nan)
-
-
-def _in_space(places: Floats) -> Floats:
-    """Places of the plane, (n, 2), in space, (n, 3)."""
-    return np.column_stack([places, np.where(np.isnan(places[:, 0]), np.nan, 0.0)])
 
 
 def four_places(
