@@ -146,31 +146,25 @@ def same_notebook(committed: NotebookNode, regenerated: NotebookNode) -> bool:
     What a cell saves as a figure or table, and so shows, is compared there. Printed numbers may
     differ by one in their last digit.
     """
-    if len(committed.cells) != len(regenerated.cells):
+    (cells, said, pictures), (others, theirs, seen) = map(_shown, (committed, regenerated))
+    if cells != others or len(pictures) != len(seen) or not same_text(said, theirs, printed=True):
         return False
-    for one, other in zip(committed.cells, regenerated.cells, strict=True):
-        cells = [(cell.cell_type, cell.source, cell.metadata) for cell in (one, other)]
-        if cells[0] != cells[1]:
-            return False
-        if "versions()" in one.source:  # with which it was run is no result
+    return all(map(looks_the_same, pictures, seen))
+
+
+def _shown(notebook: NotebookNode) -> tuple[list, str, list[bytes]]:
+    """The cells of a notebook, what they print, and the texts and pictures that none saves."""
+    cells, texts, pictures = [], [], []
+    for cell in notebook.cells:
+        cells.append((cell.cell_type, cell.source, cell.metadata))
+        if "versions()" in cell.source:  # with which it was run is no result
             continue
-        (texts, pictures), (others, theirs) = _shown(one), _shown(other)
-        if not same_text("\n".join(texts), "\n".join(others), printed=True):
-            return False
-        if len(pictures) != len(theirs) or not all(map(looks_the_same, pictures, theirs)):
-            return False
-    return True
-
-
-def _shown(cell: NotebookNode) -> tuple[list[str], list[bytes]]:
-    """What a cell prints, and the texts and pictures that it shows and does not save."""
-    texts, pictures = [], []
-    for output in cell.get("outputs", []):
-        data = {} if _SAVES.search(cell.source) else output.get("data", {})
-        texts += [output.output_type, output.get("text", "")]
-        texts += [data[kind] for kind in sorted(data) if kind.startswith("text/")]
-        pictures += [base64.b64decode(data["image/png"])] if "image/png" in data else []
-    return texts, pictures
+        for output in cell.get("outputs", []):
+            data = {} if _SAVES.search(cell.source) else output.get("data", {})
+            texts += [output.output_type, output.get("text", "")]
+            texts += [data[kind] for kind in sorted(data) if kind.startswith("text/")]
+            pictures += [base64.b64decode(data["image/png"])] if "image/png" in data else []
+    return cells, "\n".join(texts), pictures
 
 
 def same_text(one: str, other: str, printed: bool = False) -> bool:
