@@ -263,3 +263,6 @@ def test_tracks_of_which_nothing_can_be_learned_come_with_the_refusal(case):
         vl.discover_from_tracks(tracks, rig.uncalibrated(0), np.arange(150), lags="synchronous")
     assert caught.value.step == "cameras"
     np.testing.assert_array_equal(caught.value.tracks[1], tracks[1])
+    thirds = [np.where(np.arange(150)[:, None] // 50 == i, t, np.nan) for i, t in enumerate(tracks)]
+    with pytest.raises(Refused, match="do two views share frames"):
+        vl.observe_tracks(thirds, rig, np.arange(150))

@@ -194,8 +194,10 @@ class Curve:
         """Pixels a frame, (n, 2), from the frame before to the frame after; finite everywhere.
 
         Over whole frames, the noise of such a difference does not depend on that of the value
-        between them: both ends share as much with it.
+        between them: both ends share as much with it. Zero where no frame shows the target.
         """
+        if not self.shown.any():
+            return np.zeros((*np.shape(frames), 2))
         seen = self.clock[self.shown]
         back, on = (np.clip(frames + step, seen[0], seen[-1]) for step in (-1, 1))
         width = np.maximum(on - back, 1)[..., None]
