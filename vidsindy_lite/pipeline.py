@@ -591,15 +591,19 @@ class VideoDiscovery(Observation):
 
         In gaps, too, across which the law leads; NaN elsewhere.
         """
-        law = self.discovery
-        m = law.system.states // law.system.order
+        curve, turn = self.discovery.curve(self.t), self.turn
         if self.circle is not None:
-            angle = law.curve(self.t)[:, :1]
-            away = np.hstack([np.cos(angle), np.sin(angle)]) @ self.circle.axes
+            away = np.hstack([np.cos(curve[:, :1]), np.sin(curve[:, :1])]) @ self.circle.axes
             return self.circle.centre + self.circle.radius * away
-        turn = np.eye(self.x.shape[1])[:m] if law.orientation is None else law.orientation
         still = np.nanmean(self.x - self.x @ turn.T @ turn, axis=0)  # of what the law does not move
-        return law.curve(self.t)[:, :m] @ turn + still
+        return curve[:, : len(turn)] @ turn + still
+
+    @property
+    def turn(self) -> Floats:
+        """Axes of the law in those of ``x``, (m, d), one a row."""
+        law = self.discovery.system
+        own = np.eye(law.states // law.order, self.x.shape[1])
+        return own if self.discovery.orientation is None else self.discovery.orientation
 
     @property
     def swing(self) -> Swing | None:

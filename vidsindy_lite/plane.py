@@ -387,9 +387,10 @@ def _contradicted(found: PlaneDiscovery, vertical: bool, askew: bool) -> list[st
             doubts.append(f"length: {g} is not the {EARTH} of what flies or swings freely: {wrong}")
     if found.circle is None and g is not None:
         pull = found.discovery.physics()["direction"]
-        tilt = np.arctan2(pull.value[0], -pull.value[1])
+        (aside, upwards, _), off = pull.value @ found.turn, pull.error @ np.abs(found.turn)
+        tilt = np.arctan2(aside, -upwards)
         error, whose = (TILTED, "that was given") if vertical else (HELD, "of the picture")
-        if abs(tilt) > SURE * np.hypot(float(pull.error[0]), error):
+        if abs(tilt) > SURE * np.hypot(float(off[0]), error):
             doubts.append(
                 f"up: the pull is {np.rad2deg(tilt):.3g} degrees off the vertical {whose}: if a "
                 "slope bears it, it is no g"
