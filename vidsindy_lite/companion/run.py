@@ -46,7 +46,7 @@ EXECUTED, LOG = "executed.ipynb", "log.txt"  # in the folder of a run
 PAPERMILL = """\
 import ctypes, signal, sys
 signal.signal(signal.SIGINT, signal.SIG_IGN)
-for number in (signal.SIGTERM, signal.SIGHUP):
+for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):  # none on Windows
     signal.signal(number, lambda *_: sys.exit(1))
 if sys.platform == "linux":
     ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG
