@@ -30,11 +30,6 @@ SEEDS = st.integers(0, 2**32 - 1)
 PLACED = "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\n"
 
 
-def rmse_in_pixels(x, truth, rig):
-    pixel = np.sqrt(np.mean([camera.scale**2 for camera in rig.cameras]))
-    return np.sqrt(np.mean((x - truth) ** 2, axis=0)) / pixel
-
-
 @pytest.fixture
 def small():
     return scene(7, n=40)
@@ -138,16 +133,13 @@ def test_residuals():
 def test_calibration_errors(small):
     _, truth, _, _ = small
     first, *others = truth.cameras
-    off = Rig(
-        [replace(first, scale=1.01 * first.scale, angle=first.angle - 3 * np.pi + 0.1), *others]
-    )
+    turned = replace(first, scale=1.01 * first.scale, angle=first.angle - 3 * np.pi + 0.1)
+    off = Rig([turned, *others])
     expected = [[0.01, 0.1 - np.pi], [0, 0], [0, 0]]
     np.testing.assert_allclose(calibration_errors(off, truth), expected, atol=1e-12)
     with pytest.raises(ValueError, match="rig: must be one per camera of truth, got 2 for 3"):
         calibration_errors(Rig(others), truth)
-    with pytest.raises(
-        ValueError, match=r"truth: all cameras must be calibrated and placed, got cameras\[1\]"
-    ):
+    with pytest.raises(ValueError, match=r"truth: all cameras must .*placed, got cameras\[1\]"):
         calibration_errors(truth, truth.uncalibrated())
 
 
@@ -236,7 +228,8 @@ def test_exact_tracks_give_the_exact_path(seed, which):
     for camera, true in zip(learned.cameras, rig.cameras, strict=True):
         np.testing.assert_allclose(camera.offset, true.offset, atol=1e-6 * np.abs(x).max())
     assert np.abs(calibration_errors(learned, rig)).max() < 1e-7
-    assert rmse_in_pixels(reconstruct(tracks, learned), x, rig).max() < 1e-5
+    pixel = np.sqrt(np.mean([camera.scale**2 for camera in rig.cameras]))
+    assert np.abs(reconstruct(tracks, learned) - x).max() < 1e-5 * pixel
 
 
 def test_what_cannot_be_learned_is_said(small):
@@ -277,15 +270,6 @@ def test_a_search_that_ran_out_of_steps_is_told(monkeypatch, small):
     found = vl.learn_lags(*given)
     assert found.agree
     assert "the search for the lags of the videos did not converge" in found.warnings[0]
-
-
-def test_warnings_are_no_part_of_a_rig(tmp_path, small):
-    rig = small[1]
-    doubtful = replace(rig, warnings=("no",))
-    assert doubtful == rig
-    assert hash(doubtful) == hash(rig)
-    doubtful.save(tmp_path / "rig.toml")
-    assert vl.Rig.load(tmp_path / "rig.toml").warnings == ()
 
 
 def test_what_eq_4_needs(small):

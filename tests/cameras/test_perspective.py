@@ -45,12 +45,7 @@ def test_noisy_pixels_give_the_least_squares_of_scipy(cameras, kinds):
 
 def test_lines_that_meet_behind_a_camera_give_no_point():
     straight = {"scale": 0.001, "angle": 0.0, "image_size": (1001, 1001)}
-    rig = Rig(
-        [
-            PerspectiveCamera(position=(0, 0, 10), normal=(0, 0, 1), **straight),
-            PerspectiveCamera(position=(4, 0, 10), normal=(0, 0, 1), **straight),
-        ]
-    )
+    rig = Rig(PerspectiveCamera(position=(x, 0, 10), normal=(0, 0, 1), **straight) for x in (0, 4))
     # By hand: (0, 0, 2) lies 8 below the first camera, and .5 of the depth to the other's side.
     seen = [np.array([[500.0, 500.0]]), np.array([[0.0, 500.0]])]
     np.testing.assert_allclose(reconstruct(seen, rig), [[0, 0, 2]], atol=1e-9)
@@ -62,6 +57,9 @@ def test_behind_the_camera_nothing_is_seen():
     camera = PerspectiveCamera(position=(0, 0, 10), normal=(0, 0, 1), scale=1, angle=0)
     seen = camera.project([[0, 0, 9], [0, 0, 10], [0, 0, 11], [np.nan, 0, 0]])
     assert np.isnan(seen).all(axis=1).tolist() == [False, True, True, True]
+    for radius in (0, -1, 10, 11):
+        with pytest.raises(ValueError, match=f"radius: must be positive and .* got {radius}"):
+            camera.ball_image([[0, 0, 0]], radius)
 
 
 @given(SEEDS, st.floats(0.01, 0.3))
@@ -81,13 +79,6 @@ def test_outline_is_that_of_the_tangent_cone(seed, size):
             rays /= np.linalg.norm(rays, axis=1, keepdims=True)
             nearest = np.linalg.norm(np.cross(rays, centre - camera.position), axis=1)
             np.testing.assert_allclose(nearest, radius, rtol=1e-8)
-
-
-def test_bad_radius():
-    camera = PerspectiveCamera(position=(0, 0, 10), normal=(0, 0, 1), scale=1, angle=0)
-    for radius in (0, -1, 10, 11):
-        with pytest.raises(ValueError, match=f"radius: must be positive and .* got {radius}"):
-            camera.ball_image([[0, 0, 0]], radius)
 
 
 @given(SEEDS, st.data())
@@ -120,12 +111,9 @@ def test_one_camera_may_be_known_through_another():
 
 def test_motion_in_one_plane_through_two_cameras():
     # Every line of sight of the known camera is then seen as the same line.
-    base = {"scale": 1e-3, "angle": 0.3}
     rig = Rig(
-        [
-            PerspectiveCamera(position=(10, 0, 0), normal=(1, 0, 0), **base),
-            PerspectiveCamera(position=(0, 10, 0), normal=(0, 1, 0), **base),
-        ]
+        PerspectiveCamera(position=10 * axis, normal=axis, scale=1e-3, angle=0.3)
+        for axis in np.eye(3)[:2]
     )
     t = np.linspace(0, 6, 50)
     flat = np.column_stack((np.sin(t), np.cos(2 * t), 0 * t))

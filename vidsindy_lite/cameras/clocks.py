@@ -208,13 +208,15 @@ class Curve:
 class Footage:
     """What several videos show at the same instants, shape (n,), of the first one's clock.
 
-    Lags and rates, (m,), are those of `align`.
+    Lags and rates, (m,), are those of `align`. A frame of the first one lasts so many of that which
+    was taken for it.
     """
 
     curves: tuple[Curve, ...]
     instants: Floats
     lags: Floats
     rates: Floats
+    lasting: float = 1.0
 
     @classmethod
     def of(
@@ -348,8 +350,8 @@ class Clock:
     def mended(self, footage: Footage) -> Clock:
         """That of footage which was put right; the times are those of its first video."""
         times, old, new = self.times, self.frames[0], footage.instants
-        if not np.array_equal(new, old):
-            step = np.ptp(times) / np.ptp(old)
+        if footage.lasting != 1 or not np.array_equal(new, old):
+            step = footage.lasting * np.ptp(times) / np.ptp(old)
             times = times[0] + step * new
         return Clock(times, footage.rates, footage.clocks)
 

@@ -544,7 +544,8 @@ def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str
             tracks, clocks = ([one[i] for i in order] for one in (given.tracks, given.clocks))
             how = "swapped" if len(moved) == 2 else "in another order than their cameras"
             what = f"{' and '.join(names[i] for i in moved)} {how}"
-            yield what, Footage.of(tracks, None, given.rates[order], clocks)
+            mended = Footage.of(tracks, None, given.rates[order], clocks)
+            yield what, replace(mended, lasting=1 / given.rates[order[0]])
     known = {i for i, camera in enumerate(rig.cameras) if camera.is_calibrated}
     for views in (*({i} for i in range(count)), {*range(count)}):
         told, ways = "all views", ["mirrored", "with v counted upwards"]
@@ -564,7 +565,7 @@ def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str
     for i, (real, stated) in product(range(count), RATES):
         rates = np.where(np.arange(count) == i, real / stated, 1.0) * given.rates
         what = f"{names[i]} with {real} frames for {stated} that are supposed"
-        yield what, replace(given, rates=rates / rates[0])
+        yield what, replace(given, rates=rates / rates[0], lasting=1 / rates[0])
 
 
 def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
