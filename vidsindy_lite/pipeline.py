@@ -88,7 +88,8 @@ class Observation:
     @property
     def residuals(self) -> list[Floats]:
         """Tracks minus what the cameras see of the path, in the shape of the tracks."""
-        missed = cameras.residuals([cameras.stacked(track, 2) for track in self.tracks], self.rig)
+        tracks = [cameras.stacked(track, 2) for track in self.tracks]
+        missed = cameras.residuals(tracks, cameras.paced(self.rig, self.lags.rates))
         return [cameras.side_by_side(one, self.targets) for one in missed]
 
 
@@ -271,7 +272,7 @@ def _observed(
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
     films = Footage.of(raw, lags, clock.rates, clock.frames)
-    affine = None
+    rig, affine = cameras.paced(rig, clock.rates), None
     if not rig.is_measured:
         with refusing("cameras", raw, names):
             far, most = cameras.factorised(films, rig, lags is not None), cameras.GROSS
@@ -297,6 +298,7 @@ def _observed(
         start, mistake = lags, cameras.find_mistake(films, rig, names)
         if mistake is not None:  # and is put right, as nothing can be learned with it
             first, films = [mistake.text], mistake.footage
+            rig = cameras.paced(rig, films.rates / clock.rates)
             raw, clock = films.tracks, clock.mended(films)
             lags, start = None, mistake.lags.frames
         with refusing("lags", raw, names):
@@ -341,6 +343,7 @@ def _concluded(
     errors = np.stack([*modes, *cameras.tracking_errors(tracks, rig, motion, raw)])
     moves = np.arange(3) < moving
     x = cameras.reconstruct(tracks, rig) * moves
+    rig = cameras.paced(rig, 1 / clock.rates)
     return Observation(tracks, rig, lags, clock.times, x, errors * moves, warnings)
 
 
@@ -358,6 +361,7 @@ def _several_observed(
     each = zip(*(np.split(track, count, axis=1) for track in raw), strict=True)
     aligned = [Footage.of(one, begun, clock.rates, clock.frames).aligned for one in each]
     tracks = [np.hstack(views) for views in zip(*aligned, strict=True)]
+    rig = cameras.paced(rig, clock.rates)
     with refusing("cameras", tracks, names):
         who = cameras.identify(tracks, rig)
     rows = [cameras.stacked(track, 2) for track in who.tracks]
@@ -369,6 +373,7 @@ def _several_observed(
     return replace(
         seen,
         tracks=tuple(cameras.side_by_side(track, count) for track in seen.tracks),
+        rig=cameras.paced(seen.rig, 1 / clock.rates),
         lags=replace(seen.lags, frames=begun, rates=clock.rates),
         t=t,
         x=cameras.side_by_side(seen.x, count),

@@ -299,6 +299,20 @@ def test_lags_and_rolling_shutters_are_told_apart():
     np.testing.assert_allclose(found.frames, lags, atol=0.1)
 
 
+def test_a_shutter_is_told_in_frames_of_its_own_video():
+    rng, rates = np.random.default_rng(8), (1, 0.5, 2)
+    rig, clocks = room(rng, readout=0.5), [np.arange(240 * rate) / rate for rate in rates]
+    tracks = [
+        shot(rng, rig, clock * rate, noise=0.1, path=lambda k, rate=rate: walk(2 * k / rate))[i]
+        for i, (clock, rate) in enumerate(zip(clocks, rates, strict=True))
+    ]
+    seen = vl.observe_tracks(tracks, rig, clocks)
+    assert seen.warnings == ()
+    assert seen.rig == rig
+    assert np.nanstd(seen.residuals) < 0.12
+    assert np.nanmax(np.abs(seen.x - walk(2 * seen.t))) < 1.5e-3
+
+
 @pytest.mark.parametrize(
     ("size", "memory", "told"),
     [(0.1, 0.0, True), (2.0, 0.0, True), (1e3, 0.0, False), (0.01, 0.9, False), (1.0, 0.35, True),

@@ -20,8 +20,8 @@ from .calibrate import systematic_errors, tracking_errors
 from .clocks import Clock, Footage, Lags, align, list_lags
 from .models import AffineCamera, Camera, OrthographicCamera, PerspectiveCamera
 from .models import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance
-from .rig import BETTER, DISAGREEMENT, GROSS, Rig, disagreement, read_calibration, reconstruct
-from .rig import residuals, rig_template
+from .rig import BETTER, DISAGREEMENT, GROSS, Rig, disagreement, paced, read_calibration
+from .rig import reconstruct, residuals, rig_template
 from .synchronise import find_mistake, learn_lags
 from .targets import identify, side_by_side, stacked
 from .unmeasured import Factorised, factorised, posed

@@ -316,6 +316,14 @@ class Rig:
         return Rig(tuple(cameras))
 
 
+def paced(rig: Rig, rates: Floats) -> Rig:
+    """The rig with its shutters told in other frames: so many of each camera's own in one."""
+    return replace(rig, cameras=tuple(
+        camera.moved(readout=camera.readout / rate, readout_error=camera.readout_error / rate)
+        for camera, rate in zip(rig.cameras, rates, strict=True)
+    ))  # fmt: skip
+
+
 def reconstruct(tracks: Sequence[Floats], rig: Rig) -> Floats:
     """3D trajectory from the tracks of a calibrated rig, by least squares in pixels.
 

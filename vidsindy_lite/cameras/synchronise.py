@@ -46,7 +46,7 @@ from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, known_to, pers
 from .calibrate import check_learnable, closed_form
 from .clocks import INSTANTS, OVERLAP, Footage, Lags, check_lags, dips, list_lags, untold_lags
 from .models import TRIMMED, Camera, at_once, epipolar_lines, epipolar_rows, missed, trimmed
-from .rig import ALIKE, BETTER, DISAGREEMENT, FINE, GROSS, Rig, check_seen
+from .rig import ALIKE, BETTER, DISAGREEMENT, FINE, GROSS, Rig, check_seen, paced
 from .unmeasured import posed
 
 _PROMISING = 8  # lags of each camera
@@ -212,7 +212,7 @@ def learn_lags(
     tracks : sequence of ndarray, shape (n_i, 2)
         One per camera of the rig, frame by frame; NaN = not seen.
     rig : Rig
-        As for `learn_cameras`.
+        As for `learn_cameras`; the readouts of shutters are told in frames of the first video.
     rates : array_like, shape (m,), optional
         Frames of each video in one frame of the first; by default one. Small errors of these are
         learned where the videos are long enough to tell them.
@@ -256,7 +256,7 @@ class _Videos:
     @classmethod
     def of(cls, given: Footage, rig: Rig, shown: tqdm | None = None) -> _Videos:
         """Of footage as it is given, with its shutters."""
-        still = at_once(rig.cameras, given.tracks)
+        still = at_once(paced(rig, 1 / given.rates).cameras, given.tracks)
         instant = tuple(replace(camera, readout=0.0) for camera in rig.cameras)
         return cls(Footage.of(still, given.lags, given.rates, given.clocks), instant, shown)
 
