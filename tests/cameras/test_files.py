@@ -118,6 +118,9 @@ def test_plain_json_and_arrays(tmp_path):
     stacked = {key: [part[key] for part in parts] for key in parts[0]}
     np.savez(paths[0], **stacked | {"size": SIZE})
     assert_same(read_calibration(paths[:1]), parts)
+    np.savez(paths[0], **stacked | {"size": SIZE, "K": stacked["K"][:2]})
+    with pytest.raises(ValueError, match="K: must be as many as all else of the cameras, got"):
+        read_calibration(paths[:1])
 
 
 def projection(part):
@@ -136,9 +139,15 @@ def test_dlt_coefficients(tmp_path, lower_left):
     rig = read_calibration([tmp_path / "dltCoefs.csv"], SIZE)
     assert_same(rig, parts)
     assert rig.warnings == ()
+    text = (tmp_path / "dltCoefs.csv").read_text("utf-8").replace(",", ";").replace(".", ",")
+    (tmp_path / "excel.csv").write_text(text, encoding="utf-8")
+    assert read_calibration([tmp_path / "excel.csv"], SIZE) == rig
 
 
 def test_projection_matrices(tmp_path):
+    parts = rooms(7)
+    lenses = [{"P": projection(part), "dist": part["dist"], "size": SIZE} for part in parts]
+    assert_same(from_json(tmp_path, listed(lenses)), parts)
     parts = rooms(7, dist=False)
     stacked = np.array([s * projection(part) for s, part in zip((1, -2, 0.1), parts, strict=True)])
     np.save(tmp_path / "p.npy", stacked)
@@ -189,6 +198,7 @@ def test_the_command_line(tmp_path, capsys):
         ("distortions = [", "distortions = [1, 1, 1, 1, ", "distortion: must be at most 8 finite"),
         ("size = [ 1280, 720,]", "size = [ 1280 ]", r"size: must be .* of shape \(2,\), got"),
         ("rotation = [", "rotation = ['a', ", "R: must be an array of real numbers, got"),
+        ("rotation = ", "rotation = [0, 90, 0] # ", "R: must be a rotation in radians, got"),
     ],
 )
 def test_malformed_tables_are_refused_by_name(tmp_path, old, new, message):

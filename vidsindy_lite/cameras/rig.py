@@ -585,7 +585,9 @@ def _content(path: Path) -> Any:
     if suffix in (".npy", ".npz"):
         return read_arrays("paths", path)
     if suffix in (".csv", ".txt"):
-        lines = re.sub("[,;]", " ", read_text("paths", path, "a table")).splitlines()
+        text = read_text("paths", path, "a table")
+        comma = "." if re.search(r";[ \t]*[-+\d]", text) else " "  # as spreadsheets write decimals
+        lines = text.replace(",", comma).replace(";", " ").splitlines()
         with reading("paths", path, "rows of as many numbers each"):
             return np.array([line.split() for line in lines if line.strip()], dtype=float)
     raise ValueError(
@@ -651,9 +653,15 @@ def _tables(content: Any, name: str, warnings: list[str]) -> Iterator[tuple[str,
     ]
     if strange:
         warnings.append(f"{name}nothing is known of {', '.join(strange):.80}, which is left out")
-    stacked = np.ndim(known.get("K", 0)) == 3
-    for i in range(len(known["K"]) if stacked else 1):
-        yield name, {key: v[i] if stacked and np.ndim(v) > 1 else v for key, v in known.items()}
+    if np.ndim(known.get("K", 0)) < 3:
+        yield name, known
+        return
+    stacked = {key: value for key, value in known.items() if np.ndim(value) > 1}
+    counts = {key: len(value) for key, value in stacked.items()}
+    if len(set(counts.values())) > 1:
+        raise ValueError(f"{name}K: must be as many as all else of the cameras, got {counts}")
+    for parts in zip(*stacked.values(), strict=True):
+        yield name, known | dict(zip(stacked, parts, strict=True))
 
 
 def _is_set(value: Any) -> bool:
@@ -711,7 +719,8 @@ def _decomposed(table: dict[str, Any], name: str, warnings: list[str]) -> Iterat
                 f"{name or f'camera [{i}]: '}its pixels are skew, by {told}, which is left out"
             )
         inner[0, 1] = 0
-        yield {"K": inner, "R": rotation, "t": -rotation @ place[:3, 0] / place[3], "size": size}
+        shift = -rotation @ place[:3, 0] / place[3]
+        yield table | {"K": inner, "R": rotation, "t": shift}
 
 
 def _camera(table: dict[str, Any]) -> PerspectiveCamera:
@@ -727,7 +736,10 @@ def _camera(table: dict[str, Any]) -> PerspectiveCamera:
         raise ValueError(f"K: must have no skew, got {inner[0, 1]:g}")
     turned = check_array("R", table["R"])
     if turned.size == 3:
-        rotation = Rotation.from_rotvec(_shaped("R", turned, (3,))).as_matrix()
+        axis = _shaped("R", turned, (3,))
+        if np.linalg.norm(axis) > 2 * np.pi:
+            raise ValueError(f"R: must be a rotation in radians, got {axis.tolist()}")
+        rotation = Rotation.from_rotvec(axis).as_matrix()
     else:
         rotation = _shaped("R", turned, (3, 3))
         if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-5 or np.linalg.det(rotation) < 0:
