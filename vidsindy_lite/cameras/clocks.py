@@ -208,8 +208,8 @@ class Curve:
 class Footage:
     """What several videos show at the same instants, shape (n,), of the first one's clock.
 
-    Lags and rates, (m,), are those of `align`. A frame of the first one lasts so many of that which
-    was taken for it.
+    Lags and rates, (m,), are those of `align`. A frame of the first one lasts so many of those that
+    rates were told in, which are its own but where another video was taken for it.
     """
 
     curves: tuple[Curve, ...]
@@ -228,8 +228,8 @@ class Footage:
     ) -> Footage:
         """Of checked tracks; by default they are at the same instants already."""
         curves = tuple(map(Curve, tracks, check_clocks(clocks, tracks)))
-        shifts = check_lags("lags", lags, len(tracks))
-        return cls(curves, curves[0].clock, shifts, check_rates(rates, len(tracks)))
+        shifts, each = check_lags("lags", lags, len(tracks)), check_rates(rates, len(tracks))
+        return cls(curves, curves[0].clock, shifts, each / each[0], 1 / each[0])
 
     @property
     def tracks(self) -> tuple[Floats, ...]:
@@ -301,14 +301,14 @@ def check_lags(name: str, lags: ArrayLike | None, count: int) -> Floats:
 
 
 def check_rates(given: ArrayLike | None, count: int) -> Floats:
-    """One rate per video, in units of the first one's."""
+    """One rate per video."""
     rates = np.ones(count) if given is None else check_vector("rates", given, count)
     for rate in rates:
         if not 1 / _FASTEST <= check_positive("rates", rate) <= _FASTEST:
             raise ValueError(
                 f"rates: must be between {1 / _FASTEST:g} and {_FASTEST:g}, got {rate:g}"
             )
-    return rates / rates[0]
+    return rates
 
 
 def check_clocks(given: Sequence[ArrayLike] | None, tracks: Sequence[Floats]) -> tuple[Floats, ...]:

@@ -35,6 +35,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations, product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -441,25 +442,12 @@ def _blurred(i: int, lags: Floats) -> str:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Mistake:
-    """What may have been done to the footage, and what it is without that."""
+class Mistake(NamedTuple):
+    """What explains that the views did not agree, and the footage without it, with its lags."""
 
-    what: str
+    text: str
     footage: Footage
     lags: Lags
-    before: float
-    alike: tuple[str, ...]
-
-    @property
-    def text(self) -> str:
-        """What explains that the views did not agree."""
-        return (
-            f"the rig does not agree with the tracks as they are given: {self.what} explains it "
-            f"({self.lags.residual:.2g} pixels apart instead of {self.before:.3g}), and was put "
-            "right here: do so in what is given"
-            + (f"; as well do {', and '.join(self.alike)}: another path" if self.alike else "")
-        )
 
 
 def _paired(footage: Footage, cameras: Sequence[Camera]) -> tuple[float, Floats]:
@@ -523,8 +511,13 @@ def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | No
                 told = learn_lags(mended.tracks, rig, mended.rates, lags, mended.clocks)
                 if told.agree and told.residual <= 2 * DISAGREEMENT:
                     others = [o for n, _, o, _ in tried if n <= ALIKE * max(now, FINE)]
-                    alike = tuple(dict.fromkeys(o for o in others if o != what))
-                    found.append(Mistake(what, mended, told, left, alike))
+                    alike = ", and ".join(dict.fromkeys(o for o in others if o != what))
+                    text = (
+                        f"the rig does not agree with the tracks as they are given: {what} "
+                        f"explains it ({told.residual:.2g} pixels apart instead of {left:.3g}), "
+                        "and was put right here: do so in what is given"
+                    ) + (f"; as well do {alike}: another path" if alike else "")
+                    found.append(Mistake(text, mended, told))
                     break
     return min(found, key=lambda one: one.lags.residual, default=None)
 
@@ -544,8 +537,7 @@ def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str
             tracks, clocks = ([one[i] for i in order] for one in (given.tracks, given.clocks))
             how = "swapped" if len(moved) == 2 else "in another order than their cameras"
             what = f"{' and '.join(names[i] for i in moved)} {how}"
-            mended = Footage.of(tracks, None, given.rates[order], clocks)
-            yield what, replace(mended, lasting=1 / given.rates[order[0]])
+            yield what, Footage.of(tracks, None, given.rates[order], clocks)
     known = {i for i, camera in enumerate(rig.cameras) if camera.is_calibrated}
     for views in (*({i} for i in range(count)), {*range(count)}):
         told, ways = "all views", ["mirrored", "with v counted upwards"]
@@ -565,7 +557,7 @@ def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str
     for i, (real, stated) in product(range(count), RATES):
         rates = np.where(np.arange(count) == i, real / stated, 1.0) * given.rates
         what = f"{names[i]} with {real} frames for {stated} that are supposed"
-        yield what, replace(given, rates=rates / rates[0], lasting=1 / rates[0])
+        yield what, Footage.of(given.tracks, given.lags, rates, given.clocks)
 
 
 def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
