@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from vidsindy_lite.dynamics import inference
 from vidsindy_lite.dynamics import path as paths
 from vidsindy_lite.dynamics.model import PolynomialSystem
 from vidsindy_lite.dynamics.path import LARGEST
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import (
+    FLOWS,
     REFERENCE_OFFSET,
     SYSTEMS,
     FlowContest,
@@ -63,6 +65,16 @@ def test_smooth_errors_do_not_become_terms(swing, monkeypatch):
     monkeypatch.setattr(paths, "TOLERATED", 0.0)
     monkeypatch.setattr(paths, "SMOOTH", 0.0)
     assert not score(discover(t, bent(x, 0.001)), DUFFING).exact
+
+
+@pytest.mark.parametrize(("name", "seed"), [("NoseHoover", 4), ("BurkeShaw", 10)])
+def test_a_bent_space_moves_no_origin(name, seed, monkeypatch):
+    t, x = FLOWS[name].trajectory(800)
+    x = corruption.distort(x, 0.002, np.random.default_rng([1, seed]))
+    assert score(discover(t, x, order=1), FLOWS[name]).exact
+    # By the errors of independent samples, it is a hundredth of the spread away.
+    monkeypatch.setattr(inference, "place_errors", lambda fit: 0.0)
+    assert not score(discover(t, x, order=1), FLOWS[name]).exact
 
 
 def test_a_law_that_hangs_on_the_tolerated_error_is_told(swing):

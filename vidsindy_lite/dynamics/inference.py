@@ -20,7 +20,7 @@ from .data import Units
 from .l0 import inverse, newcomers
 from .library import divides, shift_generators, shift_matrix
 from .model import runge_kutta_4
-from .noise import residual_noise
+from .noise import place_errors, residual_noise
 from .problem import Problem
 from .result import Discovery, History, Path
 
@@ -175,6 +175,8 @@ def _covariance(units: Units, fit: Fit, model: Linearisation) -> Floats:
     size = len(fit.state.flat())
     covariance = np.zeros((size, size))
     covariance[np.ix_(columns, columns)] = inverse(model.of(columns).information)
+    moving = size - len(units.scale) + np.flatnonzero(fit.state.moving)
+    covariance[moving, moving] += place_errors(fit) ** 2
     factors = units.factors(fit.collocation.exponents)
     unit = np.concatenate([factors.T.ravel(), units.scale])
     sources = fit.state.sources

@@ -131,6 +131,16 @@ def passing(fit: Fit, tried: int) -> Bools:
     return np.where(seen, forgotten, forgotten[seen].all())
 
 
+def place_errors(fit: Fit) -> float:
+    """How large errors are that the motion brings along, over the spread; 0 if there are none.
+
+    Those of a bent space do not average out, and move the origin of a law by as much as they are.
+    """
+    errors = residual_noise(fit)
+    lasting = (effective_noise(fit) > 2 * errors) & ~passing(fit, len(fit.state.coefficients))
+    return float(errors[lasting & (fit.collocation.counts > 0)].max(initial=0.0))
+
+
 def independent(errors: Floats) -> float:
     """How many independent errors have a variance as uncertain as that of these, (n,).
 
