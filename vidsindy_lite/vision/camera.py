@@ -270,8 +270,7 @@ def rescaled(maps: Floats, factor: float) -> Floats:
 def stands_still(samples: Iterable[Image]) -> bool | None:
     """Does no pair of reduced samples, successive or far apart, show that the camera moves?
 
-    It moves if clearly more corners share a motion than stay where they are. None if most pairs
-    are too plain to tell.
+    None if most pairs are too plain to tell.
     """
     looks = [Look(sample) for sample in samples]
     middle = looks[len(looks) // 2]
@@ -284,29 +283,17 @@ def stands_still(samples: Iterable[Image]) -> bool | None:
 
 
 def _moved(before: Look, after: Look) -> bool | None:
-    a, b = before.follow(after, np.eye(3))
-    similar, _ = _similar(a, b, 2 * _STILL)
-    if similar is None:
-        return _drifted(before, after)
-    still = np.linalg.norm(b - a, axis=1) < _STILL
-    share = np.linalg.norm(carry(similar, a) - b, axis=1) < _STILL
-    moves = bool(still.sum() < 0.7 * share.sum())
-    # Corners that must share a motion, if it is to be the camera's.
-    few = share.sum() < max(10, moves * _AGREE * len(a))
-    # Those of one large thing are not spread over the image, by its own spread.
-    apart = 0.6 * np.linalg.norm(before.grey.shape) / np.sqrt(12)
-    if few or (moves and np.sqrt(a[share].var(axis=0).sum()) <= apart):
-        return _drifted(before, after)
-    return moves
-
-
-def _drifted(before: Look, after: Look) -> bool | None:
-    """Do all pixels tell of a motion, where corners are few? None if these are mute, too."""
-    found = align(before, after, np.eye(3))
-    if found is None or found.error > _VAGUE:
+    """Does a view lie elsewhere, by more than its error, and clearly more corners than stay?"""
+    rest = np.eye(3)
+    found = _Key(before, rest, 0.0).locate(after, rest)
+    if found is None:
         return None
+    a, b = before.follow(after, rest)
+    stay, share = (
+        np.sum(np.linalg.norm(carry(here, a) - b, axis=1) < _STILL) for here in (rest, found.map)
+    )
     moved = displacement(found.map[None], before.grey.shape[::-1])[0]
-    return bool(moved > PLAINLY / 2 * found.error)
+    return bool(moved > max(PLAINLY * found.error, _STILL) and stay <= 0.7 * share)
 
 
 def displacement(maps: Floats, size: Sequence[int]) -> Floats:
@@ -478,30 +465,16 @@ def camera_motion(
     """The camera's motion, and doubts of it.
 
     If the sampled frames do not tell that the camera is at rest, all frames are asked where they
-    lie, one after the other.
+    lie, one after the other. Maps by which the frames fit together no better than at rest only add
+    their errors.
     """
     still = stands_still(small)
-    motion = _followed(frames, small, sampled) if still is False else None
-    if motion is not None:
-        return motion, ()
+    if still is False:
+        motion = steadied(frames, frames.factor)
+        at = np.minimum(sampled, len(motion.maps) - 1)
+        known = np.isfinite(motion.errors[at])
+        if explains(small[known], rescaled(motion.maps[at[known]], frames.factor)):
+            return motion, ()
     plain = ("the background is too plain to tell whether the camera moves: if so, its motion is "
              "part of the track")  # fmt: skip
     return at_rest(frames.info.frames), () if still or rests(small) else (plain,)
-
-
-def _followed(frames: Reel, small: Image, sampled: Ints) -> CameraMotion | None:
-    """Frames laid on each other, one after the other.
-
-    None if these maps say no more than their errors: then they only add these. None, too, if the
-    frames fit together worse by them than at rest.
-    """
-    motion = steadied(frames, frames.factor)
-    errors = motion.errors[1:]
-    sure = displacement(motion.maps[1:], frames.info.size) / np.maximum(errors, 1e-3)
-    # The last of the frames show it if the camera moves at all.
-    if np.median(errors) >= frames.factor * LOOSE or np.quantile(sure, 0.95) <= PLAINLY:
-        return None
-    at = np.minimum(sampled, len(motion.maps) - 1)
-    known = np.isfinite(motion.errors[at])
-    maps = rescaled(motion.maps[at[known]], frames.factor)
-    return motion if explains(small[known], maps) else None

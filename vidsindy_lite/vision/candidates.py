@@ -421,14 +421,14 @@ def _penalty(
     return np.asarray(np.where(known, turn, start) + 0.6 * resize + colour / 120 + missed)
 
 
-def plainest_paths(seen: Candidates, most: int = 3) -> list[Motion]:
-    """Several paths that have nothing in common, the plainest first.
+def plainest_paths(seen: Candidates, most: int = 3, *, away: bool = False) -> list[Motion]:
+    """Several paths (see `best_path`) that have nothing in common, the plainest first.
 
     What counts is the value of each, as far as it travels and keeps its outline.
     """
     left, found = np.arange(len(seen.frame)), []
     for _ in range(most):
-        rows, value = best_path(seen.only(left))
+        rows, value = best_path(seen.only(left), away=away)
         if len(rows) < 5:
             break
         rows = left[rows]

@@ -562,17 +562,17 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
     film = Film.of(path)
     seen, lights = sighted(film, targets=count)
     n = len(lights)
-    # Paths of a target that may follow each other.
-    paths = plainest_paths(seen, most=count * 8)
-    lanes, strange = _lanes(seen, paths, count)
-    ways = [_joined([expected(seen, p.rows, film, n) for p in lane]) for lane in lanes]
+    paths = plainest_paths(seen, most=count + 1, away=True)
+    # Worth of a candidate of a path, relative to those of the plainest.
+    worth = [path.rating / len(path.rows) for path in paths]
+    plain = [path for path, own in zip(paths, worth, strict=True) if own >= 0.4 * worth[0]]
+    ways = [expected(seen, path.rows, film, n) for path in plain[:count]]
     touching = _touching(ways)
-    longest = max(strange, key=lambda path: len(path.rows), default=None)
     doubts: tuple[str, ...] = ()
     # Share of the frames in which one more thing moves, above which there is doubt.
-    if longest is not None and len(longest.rows) >= 0.2 * n:
+    if len(plain) > count and len(plain[count].rows) >= 0.2 * n:
         doubts = (f"{Path(path).name}: one thing more moves than there are targets, "
-                  f"{_example(film, seen, longest)}",)  # fmt: skip
+                  f"{_example(film, seen, plain[count])}",)  # fmt: skip
     lens = lens_of(film, *ways)
     tracks = []
     for way, met in zip(ways, touching, strict=True):
@@ -580,37 +580,6 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
         tracks.append(finished(viewed(film, lens, way, lights), film.motion, doubts)[0])
         doubts = ()
     return (*tracks, *[nothing(film.motion, n)] * (count - len(tracks)))
-
-
-def _lanes(
-    seen: Candidates, paths: list[Motion], count: int
-) -> tuple[list[list[Motion]], list[Motion]]:
-    """The paths of each target, one after the other in time; and paths for which none is left."""
-    lanes: list[list[Motion]] = [[] for _ in range(count)]
-    left = []
-    plainest = max((path.rating / len(path.rows) for path in paths), default=0.0)
-    taken = np.zeros((count, 1 + seen.frame.max(initial=0)), bool)
-    for path in sorted(paths, key=lambda path: -len(path.rows)):
-        # Worth of a candidate of a path, relative to those of the plainest.
-        if path.rating / len(path.rows) < 0.4 * plainest:
-            continue
-        first, last = seen.frame[path.rows[[0, -1]]]
-        free = np.flatnonzero(~taken[:, first : last + 1].any(axis=1))
-        if not len(free):
-            left.append(path)
-            continue
-        taken[free[0], first : last + 1] = True
-        lanes[free[0]].append(path)
-    return [lane for lane in lanes if lane], left
-
-
-def _joined(ways: list[Ways]) -> Ways:
-    """The ways of paths that follow each other as one."""
-    whole, *others = ways
-    for way in others:
-        free = np.isnan(whole.centre[:, :1])
-        whole = Ways(*(np.where(free, b, a) for a, b in zip(whole, way, strict=True)))
-    return whole
 
 
 def _touching(ways: list[Ways]) -> list[Bools]:
