@@ -159,18 +159,13 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
     paths = _paths(seen, hint, seed)
     if not paths and seed is None:
         return nothing(film.motion, n)
-    boxes = None
-    for k in range(3):  # if it covers its own ground: before ground that is without it
-        covered = _covering(film, seen, paths[0].rows, seed, rims=k == 0) if paths else None
-        if covered is None or (boxes is not None and _same(covered, boxes)):
-            break
-        boxes = covered
-        others = sighted(film, boxes)
+    covered = _covering(film, seen, paths[0].rows, seed) if paths else None
+    if covered is not None:  # it covers its own ground: before ground that is without it
+        others = sighted(film, covered)
         plainer = _paths(others[0], hint, seed)
         # A path that is far less plain there is of what was taken out in its place.
-        if not plainer or plainer[0].rating < 0.5 * paths[0].rating:
-            break
-        (seen, lights), paths = others, plainer
+        if plainer and plainer[0].rating >= 0.5 * paths[0].rating:
+            (seen, lights), paths = others, plainer
     rows = paths[0].rows if paths else np.zeros(0, int)
     start = seed or _plainest(seen, rows)
     if seed is None and len(rows) == n and not _rivals(paths):  # nothing is left to be told
@@ -274,27 +269,13 @@ def _rivals(paths: Sequence[Motion]) -> Sequence[Motion]:
     return [path for path in paths[1:] if path.rating > 0.5 * paths[0].rating]
 
 
-def _covering(
-    film: Film, seen: Candidates, rows: Ints, seed: Spot | None, *, rims: bool
-) -> Floats | None:
-    """Boxes (n, 4) of a target that covers its own ground in many frames, None if it does not.
-
-    Of one that hardly leaves its place a plate with it shows the `rims` only: all that differs
-    there is the target's place.
-    """
-    centre, size, n = seen.centre[rows], seen.box[rows, 2:], len(film.maps)
+def _covering(film: Film, seen: Candidates, rows: Ints, seed: Spot | None) -> Floats | None:
+    """Boxes (n, 4) of a target that covers its own ground in many frames, None if it does not."""
+    centre, size = seen.centre[rows], seen.box[rows, 2:]
     # The median of the samples does not show what is in one or two of them.
     if np.isin(film.sampled, seen.frame[rows]).sum() < 3 or _staying(centre, size) < 0.35:
         return None
-    first, end = seen.box[:, :2], seen.box[:, :2] + seen.box[:, 2:]
-    low, high = np.percentile(first[rows], 5, axis=0), np.percentile(end[rows], 95, axis=0)
-    if rims and ((high - low) < 2 * np.median(size, axis=0) + 4).all():
-        beside = (np.abs(seen.centre - (low + high) / 2) < (high - low) / 2 + 2).all(axis=1)
-        beside &= seen.area < 2 * (high - low).prod()
-        low = np.minimum(low, np.percentile(first[beside], 5, axis=0))
-        high = np.maximum(high, np.percentile(end[beside], 95, axis=0))
-        return np.tile([*low, *(high - low)], (n, 1))
-    boxes = np.full((n, 4), np.nan)
+    boxes = np.full((len(film.maps), 4), np.nan)
     boxes[seen.frame[rows]] = seen.box[rows]
     if seed is not None:  # its size is told
         boxes[seen.frame[rows]] = np.column_stack([centre - seed.size / 2, 0 * centre + seed.size])
@@ -307,13 +288,6 @@ def _staying(centre: Floats, size: Floats) -> float:
     with np.errstate(invalid="ignore"):
         inside = (np.abs(some[:, None] - centre) < size / 2).all(axis=2)
     return float(inside.mean(axis=1).max())
-
-
-def _same(one: Floats, other: Floats) -> bool:
-    """Are most boxes (n, 4) those of before, by a tenth of their size?"""
-    apart = np.abs(one - other).max(axis=1) / other[:, 2:].mean(axis=1)
-    known = np.isfinite(apart)
-    return bool(known.any() and np.median(apart[known]) < 0.1)
 
 
 def _together(
