@@ -366,14 +366,12 @@ class _Key(NamedTuple):
 
 def steadied(frames: Iterable[Image], factor: int) -> CameraMotion:
     """The motion of a camera, by frames reduced by a factor, one after the other."""
-    maps: list[Floats] = []
-    errors: list[float] = []
-    located: Aligned | None
-    for look in map(Look, frames):
-        if not maps:
-            key = before = _Key(look, np.eye(3), 0.0)
-            last, located = np.eye(3), Aligned(np.eye(3), 0.0)
-        elif (located := key.locate(look, last)) is None:
+    looks = map(Look, frames)
+    last = np.eye(3)
+    key = before = _Key(next(looks), last, 0.0)
+    maps, errors = [key.base], [key.error]
+    for look in looks:
+        if (located := key.locate(look, last)) is None:
             # Little in common with the key frame: more with the last one known.
             key, last = before, np.eye(3)
             located = key.locate(look, last)
@@ -465,15 +463,16 @@ def camera_motion(
     """The camera's motion, and doubts of it.
 
     If the sampled frames do not tell that the camera is at rest, all frames are asked where they
-    lie, one after the other. Maps by which the frames fit together no better than at rest only add
-    their errors.
+    lie, one after the other. Maps that are known badly, or by which the frames fit together no
+    better than at rest, only add their errors.
     """
     still = stands_still(small)
     if still is False:
         motion = steadied(frames, frames.factor)
         at = np.minimum(sampled, len(motion.maps) - 1)
         known = np.isfinite(motion.errors[at])
-        if explains(small[known], rescaled(motion.maps[at[known]], frames.factor)):
+        maps = rescaled(motion.maps[at[known]], frames.factor)
+        if np.median(motion.errors[1:]) < frames.factor * LOOSE and explains(small[known], maps):
             return motion, ()
     plain = ("the background is too plain to tell whether the camera moves: if so, its motion is "
              "part of the track")  # fmt: skip
