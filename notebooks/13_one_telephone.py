@@ -244,7 +244,7 @@ told = early.discovery.simulate(start, s[seen - 1 :] - s[seen - 1]).x[:, :1]
 # %%
 circle = early.circle
 places = circle.centre + circle.radius * np.hstack([np.cos(told), np.sin(told)]) @ circle.axes
-foretold = early.rig.cameras[0].project(np.pad(places, ((0, 0), (0, 1))))
+foretold = early.rig.cameras[0].project(places)
 apart = np.linalg.norm(foretold - pendular.tracks[0][seen - 1 :], axis=1)
 reach = np.ptp(pendular.tracks[0][:, 0])
 print(f"{len(first)} frames seen, {len(s) - seen} foretold; at most {100 * np.nanmax(apart) / reach:.1f} % of the swing apart")
