@@ -246,7 +246,7 @@ circle = early.circle
 places = circle.centre + circle.radius * np.hstack([np.cos(told), np.sin(told)]) @ circle.axes
 foretold = early.rig.cameras[0].project(places)
 apart = np.linalg.norm(foretold - pendular.tracks[0][seen - 1 :], axis=1)
-reach = np.ptp(pendular.tracks[0][:, 0])
+reach = np.nanmax(pendular.tracks[0][:, 0]) - np.nanmin(pendular.tracks[0][:, 0])
 print(f"{len(first)} frames seen, {len(s) - seen} foretold; at most {100 * np.nanmax(apart) / reach:.1f} % of the swing apart")
 assert np.nanmax(apart) < 0.05 * reach
 
