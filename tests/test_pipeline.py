@@ -80,7 +80,7 @@ def untracked(monkeypatch):
         ({"rig": "rig.toml"}, {}, "rig: must be of type Rig, got 'rig.toml'"),
         ({"paths": "a.mkv"}, {}, "paths: must be a list, one per camera .* got 'a.mkv'"),
         ({"paths": ["a.mkv", None, "c.mkv"]}, {}, r"paths\[1\]: must be the name of a file"),
-        ({"paths": ["\udcff.mkv"] * 3}, {}, r"paths\[0\]: must be one line of characters, got"),
+        ({"paths": ["\udcff.mkv"] * 3}, {}, r"paths\[0\]: must be made of characters, got"),
         (
             {"paths": ["a.mkv", "b.mkv", "a.mkv"]},
             {},

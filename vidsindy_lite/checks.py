@@ -71,8 +71,10 @@ def check_path(name: str, value: str | os.PathLike) -> Path:
     if not isinstance(value, str | os.PathLike):
         raise ValueError(f"{name}: must be the name of a file, got {shown(value)}")
     path = Path(value)
-    if str(path).encode(errors="ignore").decode().splitlines() != [str(path)]:
-        raise ValueError(f"{name}: must be one line of characters, got {shown(value)}")
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise ValueError(f"{name}: must be made of characters, got {shown(value)}") from None
     return path
 
 

@@ -66,7 +66,7 @@ def check_file(name: str, path: str | os.PathLike, what: str = "file") -> Path:
     """
     file = check_path(name, path)
     if not file.is_file():
-        raise FileNotFoundError(f"{name}: no such {what}, got '{path}'")
+        raise FileNotFoundError(f"{name}: no such {what}, got {str(path)!r}")
     return file
 
 
