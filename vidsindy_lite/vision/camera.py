@@ -29,7 +29,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from ..arrays import Bools, Floats, Floats32, Image, Ints
+from ..arrays import Floats, Floats32, Image, Ints
 from .plate import Plate, carry, changes, lengths, light
 from .video import Reel
 
@@ -39,7 +39,7 @@ PARTS = 12  # into which each side of an image is cut: of one corner, and of one
 LOOSE = 1.0  # pixels (reduced ones if it is to be used at all) to which a camera's motion is known
 _STILL = 0.25  # reduced pixels by which a corner at rest may seem to move
 _VAGUE = 3.0  # reduced pixels: a map that is known no better is not known
-PLAINLY = 10.0  # standard errors of a displacement that is one
+_PLAINLY = 10.0  # standard errors of a displacement that is one
 _MANY = 60  # corners that need no other witness
 _AGREE = 0.25  # share of the corners that must do so: of those of mere noise, 0.15 to 0.24 agree
 
@@ -293,7 +293,7 @@ def _moved(before: Look, after: Look) -> bool | None:
         np.sum(np.linalg.norm(carry(here, a) - b, axis=1) < _STILL) for here in (rest, found.map)
     )
     moved = displacement(found.map[None], before.grey.shape[::-1])[0]
-    return bool(moved > max(PLAINLY * found.error, _STILL) and stay <= 0.7 * share)
+    return bool(moved > max(_PLAINLY * found.error, _STILL) and stay <= 0.7 * share)
 
 
 def displacement(maps: Floats, size: Sequence[int]) -> Floats:
@@ -303,25 +303,18 @@ def displacement(maps: Floats, size: Sequence[int]) -> Floats:
     return np.array([np.sqrt(np.mean(np.sum((carry(h, points) - points) ** 2, 1))) for h in maps])
 
 
-def _similar(a: Floats, b: Floats, exact: float) -> tuple[Floats | None, Bools]:
-    """The shift, turn and scale that most corners share, and which do."""
-    # Corners for a map of four numbers.
-    if len(a) >= 8:
-        found, obey = cv2.estimateAffinePartial2D(a, b, ransacReprojThreshold=exact)
-        if found is not None:
-            return np.vstack([found, [0, 0, 1]]), obey[:, 0] > 0
-    return None, np.zeros(len(a), bool)
-
-
 def _by_corners(before: Look, after: Look, last: Floats) -> tuple[Aligned | None, bool]:
     """Where a frame lies in another, by its corners, from a map that is about right.
 
     And whether they need no other witness: they are many, and tell the map exactly.
     """
     a, b = before.follow(after, last)
-    best, good = _similar(a, b, 2 * LOOSE)
-    if best is None or good.sum() < max(20, _AGREE * len(a)):  # fewer are not worth a look
+    if len(a) < 20:  # fewer are not worth a look
         return None, False
+    found, obey = cv2.estimateAffinePartial2D(a, b, ransacReprojThreshold=2 * LOOSE)
+    if found is None or obey.sum() < max(20, _AGREE * len(a)):
+        return None, False
+    best, good = np.vstack([found, [0, 0, 1]]), obey[:, 0] > 0
     if good.sum() >= _MANY:
         full, obey = cv2.findHomography(a, b, cv2.RANSAC, LOOSE)
         if full is not None and obey.sum() >= max(_MANY, 0.8 * good.sum()):
