@@ -67,14 +67,14 @@ def test_smooth_errors_do_not_become_terms(swing, monkeypatch):
     assert not score(discover(t, bent(x, 0.001)), DUFFING).exact
 
 
-@pytest.mark.parametrize(("name", "seed"), [("NoseHoover", 4), ("BurkeShaw", 10)])
-def test_a_bent_space_moves_no_origin(name, seed, monkeypatch):
-    t, x = FLOWS[name].trajectory(800)
-    x = corruption.distort(x, 0.002, np.random.default_rng([1, seed]))
-    assert score(discover(t, x, order=1), FLOWS[name]).exact
+def test_a_bent_space_moves_no_origin(monkeypatch):
+    flow = FLOWS["NoseHoover"]
+    t, x = flow.trajectory(800)
+    x = corruption.distort(x, 0.002, np.random.default_rng([1, 4]))
+    assert score(discover(t, x, order=1), flow).exact
     # By the errors of independent samples, it is a hundredth of the spread away.
     monkeypatch.setattr(inference, "place_errors", lambda fit: 0.0)
-    assert not score(discover(t, x, order=1), FLOWS[name]).exact
+    assert not score(discover(t, x, order=1), flow).exact
 
 
 def test_a_law_that_hangs_on_the_tolerated_error_is_told(swing):
