@@ -228,7 +228,7 @@ TROUBLES = {
     "has other coefficients than the rest": unlike,
     "is settled by how large an error is tolerated": contested,
     "a sample lies far from those before and after it": jumping,
-    "places and velocities depend on each other": circling,
+    "depend on each other on these data": circling,
     "turns of the motion": lambda studio: oscillation(0.01, 200, 0.05),
     "sample faster": lambda studio: oscillation(1.3, 200, 0.02),
     "from a drive or a force that nobody named": kicked,

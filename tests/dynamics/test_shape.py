@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import PolynomialSystem, discover
-from vidsindy_lite.dynamics.diagnostics import cancelling, shapes, tied
+from vidsindy_lite.dynamics.diagnostics import related, shapes
 from vidsindy_lite.study import SYSTEMS, score
 
 TIMES = np.linspace(0, 12, 600)
@@ -41,9 +41,6 @@ NAMED = {
     "bob": (bob(pendulum(1.0)[:, 0]), "on a circle"),
     "bob in its plane": (bob(pendulum(1.5, 0.1)[:, 0])[:, [0, 2]] / [0.6, 1], "on a circle"),
     "bob that swings aside": (spherical(), "on a sphere"),
-    "line": (waves((1, 2), (0.6, 2)), "on a line"),
-    "plane": (waves((1, 2), (0.6, 3.1)) @ [[1, 0, 0.5], [0, 1, -0.2]] + [0, 0, 4], "in a plane"),
-    "sum": (waves((1, 2), (1, 3.1), (1, 1.3)) @ [[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1]], "3 of"),
     "at rest": (np.append(waves((1, 2), (1, 3.1)), 2 + 0 * TIMES[:, None], 1), "z moves by no"),
 }
 
@@ -68,18 +65,52 @@ def test_flows_are_on_no_shape(name, share):
     assert told(x / x.std(axis=0), max(share, 1e-5)) == ""
 
 
-def test_a_throw_is_in_a_plane_and_throws_are_not():
+def planet():
+    """Places and velocities on an ellipse: these go round on a circle."""
+
+    def rate(_, s):
+        return [*s[2:], *(-s[:2] / np.hypot(*s[:2]) ** 3)]
+
+    return solved(rate, [1, 0, 0, 1.2])
+
+
+PLANE = [[1, 0, 0.5, 0], [0, 1, -0.2, 0], [0, 0, 0, 1]]
+RELATED = {
+    "line": (waves((1, 2), (0.6, 2)), "xy", 1),
+    "plane": (waves((1, 2), (0.6, 3.1), (1, 1.3)) @ PLANE + [0, 0, 4, 0], "xyz", 1),
+    "circle": (np.stack([np.cos(TIMES), np.sin(TIMES)], axis=1) + [1e4, 0], "xy", 2),
+    "planet": (planet(), "xyzw", 2),
+}
+
+
+@pytest.mark.parametrize("name", RELATED)
+def test_states_that_depend_on_each_other_are_named(name):
+    x, of, degree = RELATED[name]
+    names = "xyzw"[: x.shape[1]]
+    (told,) = related(names, x, 3)
+    assert told.startswith(f"{', '.join(of)} depend on each other on these data")
+    assert f"a relation of degree {degree} holds" in told
+    assert list(related(names, x, degree - 1)) == []
+    noisy = x + 0.05 * x.std(axis=0) * np.random.default_rng(0).standard_normal(x.shape)
+    assert list(related(names, noisy, 3)) == []
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_states_of_flows_do_not_depend_on_each_other(name):
+    assert list(related("xyz", SYSTEMS[name].trajectory(1500)[1], 2)) == []
+
+
+def test_what_is_constant_depends_on_nothing():
     t = np.linspace(0, 1.5, 90)
-    runs = [
-        np.stack([4 * np.cos(a) * t, 4 * np.sin(a) * t, 8 * t - 4.9 * t**2], axis=1)
-        for a in (0.5, 2.5)
-    ]
-    noise = np.full(3, 1e-5)
-    assert "in a plane (x - 1.83 y = 0)" in " ".join(shapes(runs[0], noise, "xyz"))
-    assert list(shapes(np.concatenate(runs), noise, "xyz")) == []
-    x = np.stack([np.cos(t), np.sin(t), np.cos(t)], axis=1)  # no factor of one
-    told = " ".join(shapes(x, np.full(3, 1e-6), "xyz"))
-    assert "(x - z = 0)" in told or "(z - x = 0)" in told
+    assert list(related(("x", "vx"), np.stack([t, 1 + 0 * t], axis=1), 3)) == []
+    assert list(related(("x",), t[:, None], 3)) == []
+
+
+def test_a_law_of_a_planet_is_never_simply_ok():
+    x = planet()[:, :2]
+    noise = 0.01 * np.random.default_rng(0).standard_normal(x.shape)
+    warnings = discover(TIMES, x + noise, order=2, degree=2).warnings
+    assert any("x, y, vx, vy depend on each other" in warning for warning in warnings)
 
 
 def test_an_arc_that_is_passed_once_is_no_circle():
@@ -103,23 +134,8 @@ def test_a_spring_that_is_alike_in_all_directions_is_not_told_from_a_flow():
     for stiff, doubted in (((4, 4), True), ((4, 7), False)):
         k = np.array(stiff)
         x = solved(lambda _, s, k=k: [*s[2:], *(-k * s[:2] - 0.1 * s[2:])], [1, 0, 0, 1.5], t)
-        assert bool(list(tied(("x", "y", "vx", "vy"), x))) == doubted
         warnings = discover(t, x[:, :2], order=2, degree=2).warnings
-        assert any("places and velocities" in warning for warning in warnings) == doubted
-    assert list(tied(("x", "y"), x[:, :2])) == []
-    assert list(tied(("x", "vx"), np.stack([t, np.ones_like(t)], axis=1)))
-
-
-def test_terms_that_cancel_are_told():
-    x = np.stack([np.cos(TIMES), np.sin(TIMES)], axis=1)
-    plain = PolynomialSystem.from_terms({"x": {"y": -1}, "y": {"x": 1}}, degree=3)
-    assert list(cancelling(plain, x)) == []
-    assert list(cancelling(plain.shift((1e4, 0)), x + [1e4, 0])) == []
-    idle = PolynomialSystem.from_terms(
-        {"x": {"y": 999, "x^2 y": -1e3, "y^3": -1e3}, "y": {"x": 1}}, degree=3
-    )
-    (warning,) = cancelling(idle, x)
-    assert warning.startswith("the terms of dx/dt cancel")
+        assert any("depend on each other on these" in warning for warning in warnings) == doubted
 
 
 def test_a_law_on_a_shape_is_never_simply_ok():

@@ -14,22 +14,22 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 from scipy.special import betaincc, chdtrc, chdtri
 
 from ..arrays import Bools, Floats, Ints
 from .collocation import CLEANEST, Fit, Linearisation, State, Status
 from .data import Trajectory, typical_step
 from .frames import closed, free_offsets, laws_at
-from .l0 import LEAST, STRONG, far_neighbours, newcomers, prior_penalties
+from .l0 import RIDGE, STRONG, far_neighbours, newcomers, prior_penalties
 from .library import (
     monomial_exponents,
     monomials,
     shift_generators,
     shift_matrix,
-    velocity_names,
 )
 from .mechanics import FAINT, Round, on_circle, on_sphere
-from .model import PolynomialSystem, place, spoken, sum_text
+from .model import PolynomialSystem, place, spoken
 from .noise import CONSISTENT, GROSS, passing, residual_noise
 from .problem import COARSE, Problem
 from .result import Path
@@ -66,22 +66,13 @@ def shapes(x: Floats, noise: Floats, names: Sequence[str]) -> Iterator[str]:
     if not moves.any():
         return
     x, noise = x[:, moves], noise[moves]
-    directions, flat = _across(x, noise)
-    d, where = x.shape[1], _round(x, noise, flat)
+    where = _round(x, noise, _across(x, noise))
     if where is not None:
         round_one, _, _ = str(where).partition("\n")
         free = "angle is" if where.shape == "circle" else "angles are"
         yield (
             f"the motion stays on a {round_one}: there its coordinates depend on each other and "
             f"many laws fit alike; its {free} free (on_{where.shape} finds it), and order=2 a law"
-        )
-    elif flat:
-        shape = {1: "on a line", 2: "in a plane"}.get(d - flat, f"in {d - flat} of {d} dimensions")
-        moving = [name for name, moves_too in zip(names, moves, strict=True) if moves_too]
-        relations = "; ".join(_relation(row, x, moving) for row in directions[:flat])
-        yield (
-            f"the motion stays {shape} ({relations}): there its coordinates depend on each other "
-            f"and many laws fit alike; give {d - flat} of them, or add runs that leave it"
         )
 
 
@@ -102,12 +93,12 @@ def is_on_circle(x: Floats, noise: Floats, places: bool, fewest: int = 5) -> boo
     if moves.sum() < 2:
         return False
     x, noise = x[:, moves], noise[moves]
-    where = _round(x, noise, _across(x, noise)[1], places)
+    where = _round(x, noise, _across(x, noise), places)
     return where is not None and where.shape == "circle"
 
 
-def _across(x: Floats, noise: Floats) -> tuple[Floats, int]:
-    """Normals of a motion, (d, d), the narrowest first, and across how many of them it is flat."""
+def _across(x: Floats, noise: Floats) -> int:
+    """Across how many directions a motion is flat."""
     d, scale = x.shape[1], x.std(axis=0)
     standard = (x - x.mean(axis=0)) / scale
     _, directions = np.linalg.eigh(standard.T @ standard)
@@ -115,19 +106,7 @@ def _across(x: Floats, noise: Floats) -> tuple[Floats, int]:
         _on(standard @ normal[:, None], float(np.linalg.norm(normal * noise / scale)), 1.0)
         for normal in directions.T[: d - 1]
     ]
-    return directions.T / scale, wide.index(False) if False in wide else d - 1
-
-
-def _relation(normal: Floats, x: Floats, names: Sequence[str]) -> str:
-    """What is constant along a motion, as text."""
-    spread = x.std(axis=0)
-    share = np.abs(normal) * spread
-    normal = np.where(share > CLOSE * share.max(), normal / normal[share.argmax()], 0.0)
-    order = np.argsort(normal != 1, kind="stable")
-    constant = float(normal @ x.mean(axis=0))
-    nil = abs(constant) < 1e-3 * float(np.linalg.norm(normal * spread))
-    sides = sum_text(normal[order], [names[k] for k in order], 4, " ")
-    return f"{sides} = {0 if nil else constant:.4g}"
+    return wide.index(False) if False in wide else d - 1
 
 
 def _round(x: Floats, noise: Floats, flat: int, places: bool = False) -> Round | None:
@@ -162,42 +141,32 @@ def _round(x: Floats, noise: Floats, flat: int, places: bool = False) -> Round |
     return where if bound and _on(off, error, widths[-2], 10 * CLOSE if back else CLOSE) else None
 
 
-def cancelling(law: PolynomialSystem, x: Floats, most: float = 300.0) -> Iterator[str]:
-    """The equations of a law whose terms cancel along a motion, seen from its middle.
+def related(names: Sequence[str], x: Floats, degree: int) -> Iterator[str]:
+    """What to say if states of a motion, (n, d), in standard units, depend on each other.
 
-    Their sizes added are so many times their sum. Only a polynomial can be seen from there.
+    A law of some degree plus a polynomial of no higher one that is zero along the motion is another
+    such law. The mean square of a polynomial over that of its gradient is how far from its zeros
+    the motion is, squared (Taubin 1991): at least, the lowest eigenvalue of the two.
     """
-    if not law.is_polynomial:
-        return
-    middle = x.mean(axis=0)
-    central, centred = law.shift(-middle), x - middle
-    sums, values = central(centred), monomials(centred, central.exponents)
-    for j, name in enumerate(law.names):
-        parts = np.abs(central.coefficients[:, j] * values).sum(axis=1)
-        times = float(np.sqrt((parts**2).mean() / max((sums[:, j] ** 2).mean(), LEAST)))
-        if times > most:
+    spread = x.std(axis=0)
+    moves = spread > CLOSE  # a velocity may be constant
+    states, moving = (x - x.mean(axis=0))[:, moves] / spread[moves], np.array(list(names))[moves]
+    for k in range(1, degree + 1) if len(moving) > 1 else ():
+        exponents = monomial_exponents(len(moving), k)
+        values, rates = monomials(states, exponents), shift_generators(exponents)
+        squares = values.T @ values / len(values)
+        slopes = (rates.swapaxes(1, 2) @ squares @ rates)[:, 1:, 1:]
+        apart = squares[1:, 1:] - np.outer(squares[1:, 0], squares[0, 1:])  # but for a constant
+        least = RIDGE * np.eye(len(apart)) * apart.trace()
+        (square,), zero = eigh(apart, slopes.sum(axis=0) + least, subset_by_index=[0, 0])
+        if square < CLOSE**2:
+            shares = (zero.T @ slopes @ zero).ravel()
+            of = ", ".join(moving[shares > CLOSE * shares.max()])
             yield (
-                f"the terms of d{name}/dt cancel (their sizes add up to {times:.1g} times "
-                "their sum): something is constant on these data; look for it, or add runs "
-                "from other starts"
+                f"{of} depend on each other on these data (a relation of degree {k} holds): many "
+                "laws fit alike; leave out what follows from others, or add runs from other starts"
             )
-
-
-def tied(names: Sequence[str], x: Floats) -> Iterator[str]:
-    """What to say if along a motion, (n, d), velocities follow from places or from each other.
-
-    So it is with a spring that is equally stiff in all directions, and two throws in space.
-    """
-    m = len(names) // 2
-    if tuple(names[m:]) != velocity_names(names[:m]):
-        return
-    with np.errstate(divide="ignore", invalid="ignore"):  # a velocity that is constant is tied
-        together = np.nan_to_num(np.corrcoef(x.T))
-    if np.linalg.eigvalsh(together)[0] < CLOSE**2:
-        yield (
-            "places and velocities depend on each other on these data (one of them is linear in "
-            "the others): many laws fit alike; add runs from other starts"
-        )
+            return
 
 
 def _on(residual: Floats, noise: float, size: float, close: float = CLOSE) -> bool:
@@ -591,8 +560,8 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
     if len(whole):
         yield from shapes(whole, noise, names[:measured])
     x, _ = fit.collocation.node_states(fit.state.control_points)
-    yield from cancelling(problem.law(fit.state), x - fit.state.offset)
-    yield from tied(names[: problem.form.states], x[:, : problem.form.states])
+    degree = int(problem.exponents[fit.state.active.any(axis=1)].sum(axis=1).max(initial=1))
+    yield from related(names[: problem.form.states], x[:, : problem.form.states], degree)
 
 
 def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:
