@@ -243,6 +243,7 @@ def test_an_interruption_holds_the_tracks_and_is_no_error_to_be_caught():
     ("more", "message"),
     [
         ({"t": range(150), "fps": 9}, "fps: must not be given with t, got 9"),
+        ({"fps": 9, "individual": "a"}, "individual: must be given with files of tracks alone"),
         ({"fps": 9, "lags": "synchronous", "still": True}, "tracks: must show a target that moves"),
     ],
 )

@@ -804,6 +804,10 @@ def _read(
             read += vision.read_tracks(given, individual)
         else:
             name = f"tracks[{len(read)}]"
+            if individual is not None:
+                raise ValueError(
+                    f"individual: must be given with files of tracks alone, got {name} as numbers"
+                )
             read.append(TrackFile(name, check_rows(name, cast("ArrayLike", given), 2), None))
     # Files that count frames from the start of their videos may begin at different ones.
     first = min((track.start for track in read), default=0)

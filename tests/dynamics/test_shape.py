@@ -87,23 +87,25 @@ RELATED = {
 def test_states_that_depend_on_each_other_are_named(name):
     x, of, degree = RELATED[name]
     names = "xyzw"[: x.shape[1]]
-    (told,) = related(names, x, 3)
+    (told,) = related(names, x, 3, 0.01)
     assert told.startswith(f"{', '.join(of)} depend on each other on these data")
     assert f"a relation of degree {degree} holds" in told
-    assert list(related(names, x, degree - 1)) == []
+    assert list(related(names, x, degree - 1, 0.01)) == []
+    bent = x + 0.002 * x.std(axis=0) * np.sin(3 * x[:, ::-1] / x.std(axis=0))
+    assert not list(related(names, bent, degree, 1e-6))  # which the data tell from zero
     noisy = x + 0.05 * x.std(axis=0) * np.random.default_rng(0).standard_normal(x.shape)
-    assert list(related(names, noisy, 3)) == []
+    assert list(related(names, noisy, 3, 0.05)) == []
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_states_of_flows_do_not_depend_on_each_other(name):
-    assert list(related("xyz", SYSTEMS[name].trajectory(1500)[1], 2)) == []
+    assert list(related("xyz", SYSTEMS[name].trajectory(1500)[1], 2, 1.0)) == []
 
 
 def test_what_is_constant_depends_on_nothing():
     t = np.linspace(0, 1.5, 90)
-    assert list(related(("x", "vx"), np.stack([t, 1 + 0 * t], axis=1), 3)) == []
-    assert list(related(("x",), t[:, None], 3)) == []
+    assert list(related(("x", "vx"), np.stack([t, 1 + 0 * t], axis=1), 3, 1.0)) == []
+    assert list(related(("x",), t[:, None], 3, 1.0)) == []
 
 
 def test_a_law_of_a_planet_is_never_simply_ok():
