@@ -30,7 +30,7 @@ from .library import (
 )
 from .mechanics import FAINT, Round, on_circle, on_sphere
 from .model import PolynomialSystem, place, spoken
-from .noise import CONSISTENT, GROSS, passing, residual_noise
+from .noise import CONSISTENT, GROSS, effective_noise, passing, residual_noise
 from .problem import COARSE, Problem, typical
 from .result import Path
 
@@ -141,18 +141,19 @@ def _round(x: Floats, noise: Floats, flat: int, places: bool = False) -> Round |
     return where if bound and _on(off, error, widths[-2], 10 * CLOSE if back else CLOSE) else None
 
 
-def related(names: Sequence[str], x: Floats, degree: int, noise: float) -> Iterator[str]:
+def related(names: Sequence[str], x: Floats, degree: int, error: float) -> Iterator[str]:
     """What to say if states of a motion, (n, d), in standard units, depend on each other.
 
     A law of some degree plus a polynomial of no higher one that is zero along the motion is another
-    such law. The mean square of a polynomial over that of its gradient is how far from its zeros
-    the motion is, squared (Taubin 1991): at least, the lowest eigenvalue of the two. It is none if
-    that is less than the noise.
+    such law; planes and quadrics are looked for. The mean square of a polynomial over that of its
+    gradient is how far from its zeros the motion is, squared (Taubin 1991): at least, the lowest
+    eigenvalue of the two. It is none if the data, a mean of which is known to an ``error``, do not
+    tell it from zero.
     """
     spread = x.std(axis=0)
     moves = spread > CLOSE  # a velocity may be constant
     states, moving = (x - x.mean(axis=0))[:, moves] / spread[moves], np.array(list(names))[moves]
-    for k in range(1, degree + 1) if len(moving) > 1 else ():
+    for k in range(1, min(degree, 2) + 1) if len(moving) > 1 else ():
         exponents = monomial_exponents(len(moving), k)
         values, rates = monomials(states, exponents), shift_generators(exponents)
         squares = values.T @ values / len(values)
@@ -160,7 +161,7 @@ def related(names: Sequence[str], x: Floats, degree: int, noise: float) -> Itera
         apart = squares[1:, 1:] - np.outer(squares[1:, 0], squares[0, 1:])  # but for a constant
         least = RIDGE * np.eye(len(apart)) * apart.trace()
         (square,), zero = eigh(apart, slopes.sum(axis=0) + least, subset_by_index=[0, 0])
-        if square < min(CLOSE, noise) ** 2:
+        if square < min(CLOSE, PLAIN * error) ** 2:
             shares = (zero.T @ slopes @ zero).ravel()
             of = ", ".join(moving[shares > CLOSE * shares.max()])
             yield (
@@ -562,8 +563,9 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
         yield from shapes(whole, noise, names[:measured])
     x, _ = fit.collocation.node_states(fit.state.control_points)
     degree = int(problem.exponents[fit.state.active.any(axis=1)].sum(axis=1).max(initial=1))
-    states, apart = problem.form.states, typical(residual_noise(fit))
-    yield from related(names[:states], x[:, :states], degree, apart)
+    states, counts = problem.form.states, np.maximum(fit.collocation.counts, 1)
+    error = typical(effective_noise(fit) / np.sqrt(counts))
+    yield from related(names[:states], x[:, :states], degree, error)
 
 
 def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:

@@ -158,7 +158,7 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
     seed = boxed and _tightened(seen, boxed)
     paths = _paths(seen, hint, seed)
     if not paths and seed is None:
-        return nothing(film.motion, n)
+        return nothing(film.motion, n, film.doubts)
     covered = _covering(film, seen, paths[0].rows, seed) if paths else None
     if covered is not None:  # it covers its own ground: before ground that is without it
         others = sighted(film, covered)
@@ -175,7 +175,7 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
     both = _together(seen, looks, film.maps, start.frame, told=seed is not None)
     rows, _ = best_path(both, away=True)
     if len(rows) < _SHORTEST:
-        return nothing(film.motion, n)
+        return nothing(film.motion, n, film.doubts)
     ways = expected(both, rows, film, n)
     doubts = _doubts(film, seen, paths, ways) if hint is None else film.doubts
     if _differing(seen, both.only(rows)) < 0.5:
@@ -347,10 +347,10 @@ def viewed(film: Film, lens: Lens, ways: Ways, lights: list[Floats32]) -> list[V
     ]
 
 
-def nothing(motion: CameraMotion, n: int) -> Track:
+def nothing(motion: CameraMotion, n: int, doubts: tuple[str, ...]) -> Track:
     """Of a film of n frames in which no target was found."""
-    none = "nothing was found that moves like one target"
-    return _as_track(np.full((n, 2), np.nan), np.full(n, np.inf), motion, (none,))
+    said = ("nothing was found that moves like one target", *doubts)
+    return _as_track(np.full((n, 2), np.nan), np.full(n, np.inf), motion, said)
 
 
 def _as_track(
@@ -418,7 +418,7 @@ def finished(
     whole, of_parts = entire(views)
     at = np.array([i for i, view in enumerate(whole) if view], int)
     if len(at) < _SHORTEST:
-        return nothing(motion, n), 0.0
+        return nothing(motion, n, doubts), 0.0
     doubts += of_parts
     shown = [view for view in whole if view]
     steady = carry(motion.maps[at], np.array([view.centroid for view in shown]))
@@ -431,7 +431,7 @@ def finished(
         doubts += (f"in {len(untold)} frames of {n} the target is seen, but not how the camera "
                    f"moved, from {untold[0]} to {untold[-1]}: they are left out",)  # fmt: skip
     if good.sum() < max(_SHORTEST, 0.05 * n):
-        return nothing(motion, n), 0.0
+        return nothing(motion, n, doubts), 0.0
     if (first := swapped(at[good], areas[good])) is not None:
         doubts += (f"from frame {at[good][first]} on, what is followed has another size at once: "
                    "perhaps it is something else",)  # fmt: skip
@@ -553,7 +553,7 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
         way.centre[met] = np.nan
         tracks.append(finished(viewed(film, lens, way, lights), film.motion, doubts)[0])
         doubts = ()
-    return (*tracks, *[nothing(film.motion, n)] * (count - len(tracks)))
+    return (*tracks, *[nothing(film.motion, n, film.doubts)] * (count - len(tracks)))
 
 
 def _touching(ways: list[Ways]) -> list[Bools]:
