@@ -35,8 +35,8 @@ from .problem import COARSE, Problem, typical
 from .result import Path
 
 # --------------------------------------------------------------------------------------------------
-# Where a motion takes place, looked at before any law: a coordinate at rest, a line, a plane, a
-# circle, a sphere.
+# Where a motion takes place: a coordinate at rest, a circle, a sphere; any plane or quadric of the
+# states, velocities included.
 #
 # There the terms of a library depend on each other, and many laws fit alike. A motion is on a
 # shape if its distance from it, less the noise, is nothing of the size of the shape: not because
@@ -563,8 +563,8 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
         yield from shapes(whole, noise, names[:measured])
     x, _ = fit.collocation.node_states(fit.state.control_points)
     degree = int(problem.exponents[fit.state.active.any(axis=1)].sum(axis=1).max(initial=1))
-    states, counts = problem.form.states, np.maximum(fit.collocation.counts, 1)
-    error = typical(effective_noise(fit) / np.sqrt(counts))
+    counts, states = fit.collocation.counts, problem.form.states
+    error = typical((effective_noise(fit) / np.sqrt(np.maximum(counts, 1)))[counts > 0])
     yield from related(names[:states], x[:, :states], degree, error)
 
 
