@@ -77,6 +77,24 @@ def test_a_bent_space_moves_no_origin(monkeypatch):
     assert not score(discover(t, x, order=1), flow).exact
 
 
+@pytest.mark.parametrize("name", ["BurkeShaw", "Chen"])
+def test_error_bars_cover_what_a_bent_space_does_to_a_law(name, monkeypatch):
+    flow = FLOWS[name]
+    t, x = flow.trajectory(600)
+    x = corruption.distort(x, 0.002, np.random.default_rng([2, 4]))
+
+    def farthest():
+        found = discover(t, x, order=1)
+        assert score(found.system, flow).exact
+        kept = found.system.support
+        return np.abs((found.coefficients - flow.coefficients) / found.standard_errors)[kept].max()
+
+    assert farthest() < 2
+    # As if such errors averaged out over the samples, they are too narrow.
+    monkeypatch.setattr(inference, "bent", lambda fit: fit)
+    assert farthest() > 2.5
+
+
 def test_a_law_that_hangs_on_the_tolerated_error_is_told(swing):
     t, x = swing
     tiny = PolynomialSystem.from_terms(

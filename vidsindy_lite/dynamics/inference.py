@@ -20,7 +20,7 @@ from .data import Units
 from .l0 import inverse, newcomers
 from .library import divides, shift_generators, shift_matrix
 from .model import runge_kutta_4
-from .noise import place_errors, residual_noise
+from .noise import bent, place_errors, residual_noise
 from .problem import Problem
 from .result import Discovery, History, Path
 
@@ -109,7 +109,7 @@ def infer(
     def told(curve: BSpline) -> BSpline:
         return BSpline(curve.t * units.time, curve.c * units.scale + units.centre, DEGREE)
 
-    return Discovery(
+    found = Discovery(
         **_in_both_frames(problem, fit, model, offset, penalties),
         native=form.law(coefficients + form.known),
         offset=offset,
@@ -122,6 +122,8 @@ def infer(
         curves=tuple(map(told, fit.splines)),
         across=tuple(map(told, across_gaps(problem, fit))),
     )
+    around = bent(fit).collocation.linearise(state, np.flatnonzero(state.free()))
+    return with_errors(found, problem, fit, around)
 
 
 def with_errors(found: Discovery, problem: Problem, fit: Fit, model: Linearisation) -> Discovery:

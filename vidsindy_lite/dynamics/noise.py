@@ -19,6 +19,7 @@ from .bspline import Segment
 from .collocation import CLEANEST, Collocation, Fit, State, Status
 from .data import CHANCE, autocovariances, inflation
 from .l0 import LEAST, RIDGE
+from .library import monomial_exponents, monomials
 from .problem import COARSE, FINAL_WEIGHT, Problem, fit_curves, spread_to_unseen, unpruned
 
 # --------------------------------------------------------------------------------------------------
@@ -139,6 +140,35 @@ def place_errors(fit: Fit) -> float:
     errors = residual_noise(fit)
     lasting = (effective_noise(fit) > 2 * errors) & ~passing(fit, len(fit.state.coefficients))
     return float(errors[lasting & (fit.collocation.counts > 0)].max(initial=0.0))
+
+
+def bent(fit: Fit, degree: int = 3) -> Fit:
+    """The fit with the errors that a bent space leaves among those that all samples share.
+
+    Such errors, as of a lens that is not undistorted, are functions of the place, come back with
+    the motion and do not average out. Each coordinate has as many as there are polynomials of the
+    place (of degree 3 as a lens, and orthogonal over the samples), all as large as what these
+    explain of its residual together; none where that may be chance or rounding, or where there are
+    fewer than ten samples for each.
+    """
+    collocation = fit.collocation
+    (n, d), seen = fit.residual.shape, np.flatnonzero(collocation.counts)
+    residual = fit.residual * np.sqrt(collocation.precision)
+    exponents = monomial_exponents(len(seen), degree)
+    k, sizes = len(exponents), np.zeros(d)
+    if n < 10 * k:
+        return fit
+    places = collocation.curve(fit.state.control_points)[:, seen]
+    modes = np.linalg.qr(monomials(places, exponents))[0]
+    explained = modes @ (modes.T @ residual)
+    for j in seen:
+        left = residual[:, j] - explained[:, j]
+        chance = inflation([left[:, None]])[0] * (left @ left) / (n - k)
+        excess = explained[:, j] @ explained[:, j] - (k + CHANCE * np.sqrt(2 * k)) * chance
+        sizes[j] = np.sqrt(excess) if excess > n * CLEANEST**2 else 0.0
+    bends = np.einsum("nk,ij->nijk", modes, np.diag(sizes)[:, sizes > 0]).reshape(n, d, -1)
+    shared = np.concatenate([collocation.systematic, bends], axis=2)
+    return replace(fit, collocation=replace(collocation, systematic=shared))
 
 
 def independent(errors: Floats) -> float:

@@ -32,7 +32,7 @@ from .l0 import STRONG
 from .library import Library, check_library, monomial_exponents, monomials
 from .mechanics import NAME
 from .model import Form
-from .noise import rebalanced, smoother_weights, views, with_process_noise
+from .noise import bent, rebalanced, smoother_weights, views, with_process_noise
 from .orientation import Measured, Solved, check_orientation, in_axes, in_sparsest_axes, with_turns
 from .path import ROUNDS, first_law, information_criterion, near, persistent
 from .problem import Problem, pose
@@ -193,7 +193,7 @@ def _oriented(task: _Task, found: Discovery) -> Discovery:
         said = "orientation: the data's own axes, as the law has no fewer terms in any others"
         return replace(found, note="; ".join(filter(None, (found.note, said))))
     law, problem, fit = best
-    return with_errors(replace(law, note=found.note), problem, fit, with_turns(problem, fit))
+    return with_errors(replace(law, note=found.note), problem, fit, with_turns(problem, bent(fit)))
 
 
 def _of_order(task: _Task, order: int | str) -> Discovery:
