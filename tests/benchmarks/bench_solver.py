@@ -51,7 +51,7 @@ def test_median_time_over_the_systems():
 
 def test_time_and_memory_are_linear_in_the_samples():
     spent, peaks = [], []
-    for n in (1500, 5000, 15000):
+    for n in (1500, 5000, 15000, 60000):
         _, t, x = measured("Lorenz", 0.1, n)
         spent.append(seconds(discover, t, x)[0])
         tracemalloc.start()
@@ -60,9 +60,11 @@ def test_time_and_memory_are_linear_in_the_samples():
         tracemalloc.stop()
         note("samples", n, spent[-1], "s")
         note("samples", n, peaks[-1], "GB", "1")
-    note("samples", "15000 over 1500", spent[-1] / spent[0], "ratio", "12")
-    assert spent[-1] <= 12 * spent[0]
-    assert peaks[-1] < 1
+    note("samples", "15000 over 1500", spent[2] / spent[0], "ratio", "12")
+    note("samples", "60000 over 15000", spent[3] / spent[2], "ratio", "5")
+    assert spent[2] <= 12 * spent[0]
+    assert spent[3] <= 5 * spent[2]
+    assert peaks[2] < 1
 
 
 def test_against_the_optimiser_of_the_paper():

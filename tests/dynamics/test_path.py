@@ -7,6 +7,7 @@ from vidsindy_lite.dynamics import inference
 from vidsindy_lite.dynamics import path as paths
 from vidsindy_lite.dynamics.model import PolynomialSystem
 from vidsindy_lite.dynamics.path import LARGEST
+from vidsindy_lite.dynamics.problem import Problem
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import (
     FLOWS,
@@ -156,3 +157,25 @@ def test_a_plateau_that_leaves_more_than_it_was_said_to_is_passed_over():
     found = discover(t[seen], x[seen], order=1)
     assert found.terms[np.flatnonzero(found.system.support[:, 0])[-1]] == "x^2"
     assert found.noise < 1e-3 * x.std()
+
+
+@pytest.mark.parametrize("last", [(2, 1), (0.3, 0)])
+def test_a_law_is_looked_for_in_a_part_of_long_data_unless_that_is_not_like_the_rest(
+    last, monkeypatch
+):
+    """Of hunters and prey every second run: without hunters, or all but one with some."""
+    law = PolynomialSystem.from_terms(
+        {"x": {"x": 1, "xy": -1, "x^2": -0.1}, "y": {"y": -1, "xy": 1}}, degree=2
+    )
+    t, rng = np.linspace(0, 20, 400), np.random.default_rng(0)
+    starts = [last, (1, 2), last, (2, 1.5), last, (1.5, 1)] if last[1] == 0 else [last, (1, 2)] * 3
+    runs = [(t, law.simulate(t, s) + 0.01 * rng.normal(size=(400, 2))) for s in starts]
+    found = []
+    for enough in (2400, 1200):
+        monkeypatch.setattr(Problem.part, "__defaults__", (enough,))
+        found.append(discover(runs, order=1, degree=2))
+    whole, part = found
+    assert score(part.system, law).exact
+    np.testing.assert_allclose(part.coefficients, whole.coefficients, atol=1e-5)
+    searches = [sum(step.stage == "all terms" for step in one.history) for one in found]
+    assert searches == ([1, 1] if last[1] else [1, 2])

@@ -375,7 +375,8 @@ class Collocation:
         response = physics.T @ unknowns
         response[:, 0] += (self.grid.samples.T @ (data_residual * self.sample_weights)).ravel()
         response[:, 1 + len(columns) :] = self._pull
-        response = -cho_solve_banded((factor, True), response, check_finite=False)
+        response = cho_solve_banded((factor, True), response, check_finite=False)
+        response = np.negative(response, order="C")  # as sparse products want it
 
         objective = (data_residual**2 * self.sample_weights).sum()
         objective += (unknowns[:, 0] ** 2).sum()

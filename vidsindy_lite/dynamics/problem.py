@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
-from scipy.interpolate import BSpline, make_lsq_spline
+from scipy.interpolate import BSpline
+from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.special import chdtri
 
 from ..arrays import Bools, Floats, Ints
-from .bspline import DEGREE, PENALTIES, Grid, Segment, smooth
+from .bspline import DEGREE, PENALTIES, WIDTH, Grid, Segment, basis, normal_band, smooth
 from .collocation import CLEANEST, Collocation, Fit, State, Status, WithCurve
 from .data import Trajectory, Units, cut, typical_step, typical_steps
 from .l0 import LEAST
@@ -195,6 +196,23 @@ class Problem:
         """Length of a knot span, in time scales: wide where the noise is."""
         return 1 / 5 if self.noise.max() > 0.02 else 1 / 16
 
+    def part(self, enough: int = 5_000) -> Problem:
+        """The same on pieces of its samples, evenly chosen, of ten turns at least; or itself.
+
+        Long data show in a part, of ``enough`` samples or a few more, what their law is.
+        """
+        length = int(min(max(enough / 10, 10 * self.samples_a_turn), enough))
+        pieces = [
+            ((i, (t[k : k + length], x[k : k + length])), curve)
+            for (i, (t, x)), curve in zip(self.stretches, self.curves, strict=True)
+            for k in range(0, max(len(t) - length // 2, 1), length)
+        ]
+        apart = sum(len(t) for _, (t, _) in self.stretches) // enough
+        if apart < 2 or len(pieces) < 2 * apart:
+            return self
+        stretches, curves = zip(*pieces[::apart], strict=True)
+        return replace(self, stretches=list(stretches), curves=curves)
+
     def segments(self) -> list[Segment]:
         """The stretches with their first knots."""
         return [Segment.even(t, x, self.spacing, i, self.jumps[i]) for i, (t, x) in self.stretches]
@@ -270,10 +288,11 @@ def fit_curves(collocation: Collocation, curves: Sequence[Callable[[Floats], Flo
     """Control points, (r, d), of the splines closest to the given curves, one a segment."""
     control = []
     for segment, curve in zip(collocation.segments, curves, strict=True):
-        b = segment.breakpoints
-        dense = np.append((b[:-1, None] + np.diff(b)[:, None] * np.arange(4) / 4).ravel(), b[-1])
-        spline = make_lsq_spline(dense, curve(dense), segment.knots, DEGREE, method="norm-eq")
-        control.append(spline.c)
+        dense = segment.refined(4).breakpoints
+        # scipy's least squares looks each point up among all knots: long data take minutes.
+        rows = basis([segment.knots], np.array([0, len(segment.knots) - WIDTH]), [dense])
+        factor = cholesky_banded(normal_band(rows), lower=True)
+        control.append(cho_solve_banded((factor, True), rows.T @ curve(dense)))
     return np.concatenate(control)
 
 
