@@ -160,9 +160,10 @@ def related(names: Sequence[str], x: Floats, degree: int, error: float) -> Itera
         slopes = (rates.swapaxes(1, 2) @ squares @ rates)[:, 1:, 1:]
         apart = squares[1:, 1:] - np.outer(squares[1:, 0], squares[0, 1:])  # but for a constant
         least = RIDGE * np.eye(len(apart)) * apart.trace()
-        (square,), zero = eigh(apart, slopes.sum(axis=0) + least, subset_by_index=[0, 0])
-        if square < min(CLOSE, PLAIN * error) ** 2:
-            shares = (zero.T @ slopes @ zero).ravel()
+        apart_by, zeros = eigh(apart, slopes.sum(axis=0) + least)
+        zeros = zeros[:, apart_by < min(CLOSE, PLAIN * error) ** 2]
+        if zeros.size:  # of several, any combination is one, too: all of their coordinates
+            shares = np.einsum("ki,jkl,li->j", zeros, slopes, zeros)
             of = ", ".join(moving[shares > CLOSE * shares.max()])
             yield (
                 f"{of} depend on each other on these data (a relation of degree {k} holds): many "
