@@ -163,7 +163,7 @@ def test_a_plateau_that_leaves_more_than_it_was_said_to_is_passed_over():
 def test_a_law_is_looked_for_in_a_part_of_long_data_unless_that_is_not_like_the_rest(
     last, monkeypatch
 ):
-    """Of hunters and prey every second run: without hunters, or all but one with some."""
+    """Every second run, which make the part, is like the others, or has prey and no hunters."""
     law = PolynomialSystem.from_terms(
         {"x": {"x": 1, "xy": -1, "x^2": -0.1}, "y": {"y": -1, "xy": 1}}, degree=2
     )

@@ -118,7 +118,8 @@ def first_law(problem: Problem, history: History, tolerated: float | None = None
     noise = problem.noise if problem.has_process_noise else np.maximum(problem.noise, least)
     tolerant, part = replace(problem, noise=noise), problem.part()
     if part is not problem:
-        law, *_ = persistent(part, first_law(part, history, tolerated), history)
+        its_own = replace(history, bar=None)  # rounds of a part are none of those that it counts
+        law, *_ = persistent(part, first_law(part, its_own, tolerated), its_own)
         collocation = tolerant.collocation(tolerant.segments())
         state = replace(law.state, control_points=fit_curves(collocation, problem.curves))
         fit = tightened(tolerant, collocation, state)

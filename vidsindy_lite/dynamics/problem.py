@@ -197,9 +197,10 @@ class Problem:
         return 1 / 5 if self.noise.max() > 0.02 else 1 / 16
 
     def part(self, enough: int = 5_000) -> Problem:
-        """The same on pieces of its samples, evenly chosen, of ten turns at least; or itself.
+        """The same on pieces of its samples, evenly chosen; or itself.
 
-        Long data show in a part, of ``enough`` samples or a few more, what their law is.
+        Long data show in a part, of ``enough`` samples or a few more, what their law is. A piece
+        is a whole stretch or ten turns of the motion; a part of less than two of these is none.
         """
         length = int(min(max(enough / 10, 10 * self.samples_a_turn), enough))
         pieces = [
