@@ -298,7 +298,7 @@ def _observed(
         start, mistake = lags, cameras.find_mistake(films, rig, names)
         if mistake is not None:  # and is put right, as nothing can be learned with it
             first, films = [mistake.text], mistake.footage
-            rig = cameras.paced(rig, films.rates / clock.rates)
+            rig = cameras.paced(mistake.rig, films.rates / clock.rates)
             raw, clock = films.tracks, clock.mended(films)
             lags, start = None, mistake.lags.frames
         with refusing("lags", raw, names):

@@ -35,6 +35,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations, product
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -443,10 +444,11 @@ def _blurred(i: int, lags: Floats) -> str:
 
 
 class Mistake(NamedTuple):
-    """What explains that the views did not agree, and the footage without it, with its lags."""
+    """What explains that the views did not agree; footage and rig without it, and the lags."""
 
     text: str
     footage: Footage
+    rig: Rig
     lags: Lags
 
 
@@ -495,29 +497,29 @@ def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | No
             # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
             # none.
             ranked = [
-                (*_paired(mended, rig.cameras), what, mended)
-                for what, mended in kind(given, rig, names)
+                (*_paired(mended, known.cameras), what, mended, known)
+                for what, mended, known in kind(given, rig, names)
             ]
             tried = [
-                (_worst(fit), fit, what, mended)
-                for _, best, what, mended in sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
-                for fit in _fits(mended, rig, start, best)
+                (_worst(fit), fit, what, mended, known)
+                for _, best, what, mended, known in sorted(ranked, key=itemgetter(0))[:_MISTAKES]
+                for fit in _fits(mended, known, start, best)
             ]
-            for now, fit, what, mended in sorted(tried, key=lambda one: one[0]):
+            for now, fit, what, mended, known in sorted(tried, key=itemgetter(0)):
                 # Times by which it has to mend the disagreement of all views together.
                 if now > GROSS or 3.0 * now >= left:
                     break
                 lags = fit.footage.lags
-                told = learn_lags(mended.tracks, rig, mended.rates, lags, mended.clocks)
+                told = learn_lags(mended.tracks, known, mended.rates, lags, mended.clocks)
                 if told.agree and told.residual <= 2 * DISAGREEMENT:
-                    others = [o for n, _, o, _ in tried if n <= ALIKE * max(now, FINE)]
+                    others = [o for n, _, o, *_ in tried if n <= ALIKE * max(now, FINE)]
                     alike = ", and ".join(dict.fromkeys(o for o in others if o != what))
                     text = (
                         f"the rig does not agree with the tracks as they are given: {what} "
                         f"explains it ({told.residual:.2g} pixels apart instead of {left:.3g}), "
                         "and was put right here: do so in what is given"
                     ) + (f"; as well do {alike}: another path" if alike else "")
-                    found.append(Mistake(text, mended, told))
+                    found.append(Mistake(text, mended, known, told))
                     break
     return min(found, key=lambda one: one.lags.residual, default=None)
 
@@ -529,15 +531,16 @@ def _worst(fit: Adjustment) -> float:
     return max(trimmed(view, 0.5) for view in views)
 
 
-def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str, Footage]]:
-    """All that change whole views: their order, their axes, and rates taken for each other."""
+def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str, Footage, Rig]]:
+    """All that change whole views: whose camera it is, their axes, rates taken for each other."""
     count, sizes = len(names), [camera.image_size for camera in rig.cameras]
+    unpaced, begun = paced(rig, 1 / given.rates).cameras, replace(given, lags=0 * given.lags)
     for moved, order in _orders(count):
         if len({sizes[i] for i in moved}) == 1:
-            tracks, clocks = ([one[i] for i in order] for one in (given.tracks, given.clocks))
             how = "swapped" if len(moved) == 2 else "in another order than their cameras"
             what = f"{' and '.join(names[i] for i in moved)} {how}"
-            yield what, Footage.of(tracks, None, given.rates[order], clocks)
+            others = replace(rig, cameras=tuple(unpaced[i] for i in order))
+            yield what, begun, paced(others, given.rates)
     known = {i for i, camera in enumerate(rig.cameras) if camera.is_calibrated}
     for views in (*({i} for i in range(count)), {*range(count)}):
         told, ways = "all views", ["mirrored", "with v counted upwards"]
@@ -553,11 +556,11 @@ def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str
             each = enumerate(zip(given.tracks, np.array(sizes) - 1, strict=True))
             turned = np.arange(2) == axis
             tracks = [np.where(turned & (i in views), side - x, x) for i, (x, side) in each]
-            yield f"{told} {how}", Footage.of(tracks, None, given.rates, given.clocks)
+            yield f"{told} {how}", Footage.of(tracks, None, given.rates, given.clocks), rig
     for i, (real, stated) in product(range(count), RATES):
         rates = np.where(np.arange(count) == i, real / stated, 1.0) * given.rates
         what = f"{names[i]} with {real} frames for {stated} that are supposed"
-        yield what, Footage.of(given.tracks, given.lags, rates, given.clocks)
+        yield what, Footage.of(given.tracks, given.lags, rates, given.clocks), rig
 
 
 def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
@@ -569,7 +572,7 @@ def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
             yield moved, order.tolist()
 
 
-def _dropped(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str, Footage]]:
+def _dropped(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str, Footage, Rig]]:
     """Videos of which frames were dropped, with the clocks by which they agree all the time."""
     length, ways = given.lengths.min(), []
     for low in _PARTS:  # in one of them none is dropped, maybe: its cameras tell when
@@ -594,7 +597,7 @@ def _dropped(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[s
     ]
     if told:  # of several places one may have taken a few frames of another
         about = "about " if len(told) > 1 else ""
-        yield ", ".join(about + one for one in told), found
+        yield ", ".join(about + one for one in told), found, rig
 
 
 def _jumped(given: Footage, mended: Footage, fit: Adjustment) -> tuple[float, Floats, Footage]:
