@@ -41,6 +41,7 @@ _STILL = 0.25  # reduced pixels by which a corner at rest may seem to move
 _VAGUE = 3.0  # reduced pixels: a map that is known no better is not known
 _PLAINLY = 10.0  # standard errors of a displacement that is one
 _MANY = 60  # corners that need no other witness
+_CHANCE = 0.04  # gain of a frame that the median of 21 shows a little of, as it is one of them
 _AGREE = 0.25  # share of the corners that must do so: of those of mere noise, 0.15 to 0.24 agree
 
 
@@ -387,16 +388,18 @@ def steadied(frames: Iterable[Image], factor: int) -> CameraMotion:
 def explains(samples: Image, maps: Floats) -> bool:
     """Are reduced frames likelier with a camera that moves by these maps than with one at rest?
 
-    Frames count by how far they are from the usual one: where that is the same, so are both plates.
+    And than with one that moves the other way: its maps smooth the noise as much, so that no more
+    than the motion tells the two apart. Frames count by how far they are from the usual one: where
+    that is the same, so are all plates.
     """
-    rest = np.broadcast_to(np.eye(3), maps.shape)
+    rest, back = np.broadcast_to(np.eye(3), maps.shape), np.asarray(np.linalg.inv(maps), float)
     size = samples.shape[2:0:-1]
     apart = np.array([displacement(np.linalg.inv(usual) @ maps, size) for usual in maps])
     weights = apart[apart.sum(axis=1).argmin()]
-    moved, rested = (_missed(samples, Plate(samples, at), at) for at in (maps, rest))
-    gains = [_gain(*both) for both in zip(moved, rested, strict=True)]
-    # Of a gain: the noise of a median of 21 frames adds that, and maps smooth it.
-    return bool(weights @ gains > 0.04 * weights.sum())
+    ways = (_missed(samples, Plate(samples, at), at) for at in (maps, rest, back))
+    gains = [(_gain(moved, r), _gain(moved, b)) for moved, r, b in zip(*ways, strict=True)]
+    over_rest, over_return = weights @ np.array(gains)
+    return bool(over_rest > 0 and over_return > _CHANCE * weights.sum())
 
 
 def rests(samples: Image) -> bool:
@@ -414,7 +417,7 @@ def rests(samples: Image) -> bool:
     gains = ([_gain(one, other) for other in off] for one, *off in zip(here, *beside, strict=True))
     least = [max(min(gain[:2]), min(gain[2:])) for gain in gains]
     # Share of the frames that say so, if the camera is at rest.
-    return bool(np.mean(np.array(least) > 0) >= 0.9)
+    return bool(np.mean(np.array(least) > _CHANCE) >= 0.9)
 
 
 def _missed(samples: Image, plate: Plate, maps: Floats) -> Iterator[Floats32]:
