@@ -29,8 +29,7 @@ def measured(name, noise, n=600, seed=11):
 
 
 @pytest.mark.parametrize(
-    ("name", "gap"),
-    [("Lorenz", 250), ("SprottE", 250), ("WangSun", 250), ("NoseHoover", 150)],
+    ("name", "gap"), [("Lorenz", 250), ("SprottE", 250), ("WangSun", 250), ("NoseHoover", 150)]
 )
 def test_clean_systems_are_recovered_exactly_across_a_gap(name, gap):
     truth, t, x = measured(name, 0.0, n=400)

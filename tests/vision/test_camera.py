@@ -11,9 +11,12 @@ from vidsindy_lite.vision.camera import align as align_on
 from vidsindy_lite.vision.plate import carry, sampled
 from vidsindy_lite.vision.video import Reel, write_video
 
+CLOUDY, VGA = (320, 240), (640, 480)
 
-def test_the_frames_of_a_camera_that_trembles_before_a_sky_lie_in_the_first(tmp_path):
-    phone = Phone("sky", 40, noise=3, camera="trembling", image_size=(320, 240), frames=60)
+
+@pytest.mark.parametrize(("ground", "noise", "size"), [("sky", 3, CLOUDY), ("hills", 16, VGA)])
+def test_the_frames_of_a_camera_that_trembles_lie_in_the_first(ground, noise, size, tmp_path):
+    phone = Phone(ground, 40, noise=noise, camera="trembling", image_size=size, frames=60)
     frames, here, there = map(np.array, zip(*render_phone(phone, 2), strict=True))
     film = Reel(write_video(tmp_path / "clip.mkv", frames))
     motion, doubts = camera_motion(film, *sampled(film)[::-1])
@@ -82,9 +85,6 @@ def test_reduced_maps_become_those_of_whole_pixels():
         end = carry(here, np.array([[41.5, 81.5]]))[0]
         np.testing.assert_allclose(end, [4 * u + 1.5, 4 * v + 1.5])
         assert here[2, 2] == pytest.approx(1)
-
-
-CLOUDY = 320, 240
 
 
 def align(before, after):
@@ -166,8 +166,9 @@ def test_all_pixels_tell_of_a_motion_where_there_are_no_corners():
     assert stands_still([views[0], sight(0, similar(0, 1e-6))]) is True
 
 
-def test_a_camera_held_before_a_plain_wall_is_doubted(tmp_path):
-    phone = Phone("plain", 20, camera="held", flicker=0.03, image_size=(320, 240), frames=40)
+@pytest.mark.parametrize(("flicker", "noise", "size"), [(0.03, 2, CLOUDY), (0, 12, VGA)])
+def test_a_camera_held_before_a_plain_wall_is_doubted(flicker, noise, size, tmp_path):
+    phone = Phone("plain", 20, (215, 30, 35), flicker, noise, False, False, "held", size, 40)
     write_phone(tmp_path / "clip.mp4", phone, 3)
     found = track(tmp_path / "clip.mp4")
     assert any("too plain to tell whether the camera moves" in doubt for doubt in found.warnings)
