@@ -534,13 +534,13 @@ def _worst(fit: Adjustment) -> float:
 def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str, Footage, Rig]]:
     """All that change whole views: whose camera it is, their axes, rates taken for each other."""
     count, sizes = len(names), [camera.image_size for camera in rig.cameras]
-    unpaced, begun = paced(rig, 1 / given.rates).cameras, replace(given, lags=0 * given.lags)
+    unpaced = paced(rig, 1 / given.rates).cameras
     for moved, order in _orders(count):
         if len({sizes[i] for i in moved}) == 1:
             how = "swapped" if len(moved) == 2 else "in another order than their cameras"
             what = f"{' and '.join(names[i] for i in moved)} {how}"
             others = replace(rig, cameras=tuple(unpaced[i] for i in order))
-            yield what, begun, paced(others, given.rates)
+            yield what, given, paced(others, given.rates)
     known = {i for i, camera in enumerate(rig.cameras) if camera.is_calibrated}
     for views in (*({i} for i in range(count)), {*range(count)}):
         told, ways = "all views", ["mirrored", "with v counted upwards"]

@@ -41,7 +41,7 @@ _STILL = 0.25  # reduced pixels by which a corner at rest may seem to move
 _VAGUE = 3.0  # reduced pixels: a map that is known no better is not known
 _PLAINLY = 10.0  # standard errors of a displacement that is one
 _MANY = 60  # corners that need no other witness
-_CHANCE = 0.04  # gain of a frame that the median of 21 shows a little of, as it is one of them
+_CHANCE = 0.04  # gain (see `_gain`) above which it tells: those of mere noise are a tenth of it
 _AGREE = 0.25  # share of the corners that must do so: of those of mere noise, 0.15 to 0.24 agree
 
 

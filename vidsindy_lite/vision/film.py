@@ -172,7 +172,9 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
         looks = Looks(np.full((n, 4), np.nan), np.zeros(n), np.ones(len(seen.frame)))
     else:
         looks = followed(film.frames, film.maps[:n], seen, start, _pace(seen, rows, start.frame))
-    both = _together(seen, looks, film.maps, start.frame, rows, told=seed is not None)
+    both = _together(
+        seen, looks, film.maps, start.frame, told=seed is not None, moves=len(rows) > 0
+    )
     rows, _ = best_path(both, away=True)
     if len(rows) < _SHORTEST:
         return nothing(film.motion, n, film.doubts)
@@ -291,9 +293,13 @@ def _staying(centre: Floats, size: Floats) -> float:
 
 
 def _together(
-    seen: Candidates, looks: Looks, maps: Floats, first: int, rows: Ints, *, told: bool
+    seen: Candidates, looks: Looks, maps: Floats, first: int, *, told: bool, moves: bool
 ) -> Candidates:
-    """Candidates of both kinds: what differs, worth what its colours say, and what looks alike."""
+    """Candidates of both kinds: what differs, worth what its colours say, and what looks alike.
+
+    `told` is whether somebody says where it is, in the frame `first`; `moves`, whether some path of
+    what differs is it.
+    """
     quality = seen.quality * (0.25 + 0.75 * looks.like)
     at = np.flatnonzero(np.isfinite(looks.box[:, 0]))
     box, area = looks.box[at], 0.7 * looks.box[at, 2:].prod(axis=1)
@@ -302,7 +308,7 @@ def _together(
     colour[:] = np.median(seen.colour, axis=0) if len(seen.colour) else 0
     for k, i in enumerate(at.tolist()):
         there = _there(seen, i, centre[k], area[k])
-        if len(rows) and not len(there):  # what else differs from the ground, here does not
+        if moves and not len(there):  # what does not differ from the ground is hardly the target
             worth[k] *= 0.5
         near = there[np.abs(np.log(seen.area[there] / area[k])) < 0.8]
         if len(near):
