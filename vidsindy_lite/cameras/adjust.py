@@ -21,27 +21,23 @@ start.
 Errors of tracks depend on their neighbours. With the slopes J of the residuals r, their noise sigma
 and the information P of measurements, what was fitted has the covariance
 
-    W = (sum_n J_n' J_n / sigma^2 + P)^-1,
+    W = (sum_n J_n' J_n / (tau sigma^2) + P)^-1,
 
-if errors do not depend on each other. If they do, it is the "sandwich"
-
-    S = W (M / sigma^4 + P) W,   M = sum_nm w(n - m) (J_n' r_n) (J_m' r_m)',
-
-with weights w that fall linearly to zero over as many frames as the residuals depend on each other.
-From few frames S is often too small by chance, and W never is but for such errors: so in every
-direction the larger of both counts.
+tau the integrated autocorrelation time of the residuals, (1 + rho) / (1 - rho) with their
+correlation rho from frame to frame: tau frames tell as much as one of independent errors.
 
 **Why views do not agree.** `explain` frees one thing at a time. Residuals of a right rig are the
 errors of the tracks. A wrong normal, lens or clock leaves more, which follows the motion; how large
 it may be without a word depends on these errors, and not on a fixed number of pixels. For each
-cause, the change c of cameras that one step finds with it free is compared with its covariance:
+cause, the squares that one step saves with it free are compared with those that it leaves:
 
-    T = c' S^-1 c,      S as above, of the residuals that the cause leaves.
+    T = (sum r^2 - sum r_c^2) / (tau_c sigma_c^2),
 
+which is chi-squared of as many degrees as the cause has components where there is none.
 With the cause that stands out most free, cameras and path are adjusted.
 
-Newey and West 1987, Econometrica 55; Andrews 1991, Econometrica 59 (the number of frames);
-Triggs et al. 2000, "Bundle adjustment: a modern synthesis".
+Bartlett 1946, J. R. Stat. Soc. Suppl. 8 (tau); Triggs et al. 2000, "Bundle adjustment: a modern
+synthesis".
 """
 
 from __future__ import annotations
@@ -53,7 +49,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.ndimage import minimum_filter1d
-from scipy.special import fdtri, gammaincinv
+from scipy.special import chdtri, gammaincinv
 
 from ..arrays import Bools, Floats
 from .clocks import Footage
@@ -103,60 +99,21 @@ _DAMPING = (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2)
 LAG, DRIFT = PARTS["lag"][0], PARTS["drift"][0]
 
 
-def fitted_factor(missed: Floats, slopes: Floats, prior: Floats, noise: float) -> Floats:
-    """A factor F of the covariance F F' of parameters, (k, k), that were fitted.
+def persistence(missed: Floats) -> float:
+    """Correlation of residuals, (n, k), with those of the next frame; that of noise is zero."""
+    now, then = missed[:-1], missed[1:]
+    both = np.isfinite(now) & np.isfinite(then)
+    squares = np.sqrt(np.sum(now[both] ** 2) * np.sum(then[both] ** 2))
+    return float(np.sum((now * then)[both]) / max(squares, 1e-300))
 
-    Parameters
-    ----------
-    missed, slopes : ndarray, shape (n, m) and (n, m, k)
-        Residuals, and their slopes.
-    prior : ndarray, shape (k,)
-        Information of measurements on the parameters.
-    noise : float
-        Standard deviation of the residuals.
+
+def lasting(missed: Floats) -> float:
+    """How many times the variance of a sum of residuals, (n, k), is that of independent ones.
+
+    Of an autoregressive series of first order: its integrated autocorrelation time, in frames.
     """
-    square = np.einsum("nmk,nml->kl", slopes, slopes) + noise**2 * np.diag(prior)
-    size = np.sqrt(np.diag(square))  # of each parameter: units of pixels, metres and radians
-    size[size == 0] = 1.0
-    values, ways = np.linalg.eigh(square / np.outer(size, size))
-    # Less of the largest information of any direction is rounding.
-    told = values > 1e-15 * values.max(initial=0.0)
-    # In the directions of `half`, of length one over sigma, W is the unit matrix.
-    half = ways[:, told] / np.sqrt(values[told]) / size[:, None]
-    scores = np.einsum("nmk,nm->nk", slopes, missed) @ half
-    measured = noise**2 * half.T @ np.diag(prior) @ half
-    sandwich = long_run_covariance(scores) * len(scores) + noise**2 * measured
-    grown, turned = np.linalg.eigh(sandwich)
-    return half @ turned * np.sqrt(np.maximum(grown, noise**2))
-
-
-def long_run_covariance(series: Floats) -> Floats:
-    """Covariance of the mean of a stationary series of mean zero, times its length.
-
-    Parameters
-    ----------
-    series : ndarray, shape (n, k)
-
-    Returns
-    -------
-    ndarray, shape (k, k)
-        ``sum_h w_h E[s_n s_(n+h)']`` with Bartlett's weights; their width is that which is best
-        for autoregressive series of first order.
-    """
-    n, width = len(series), bandwidth(series)
-    total = series.T @ series
-    for lag in range(1, min(int(np.ceil(width)), n - 1) + 1):
-        product = series[lag:].T @ series[:-lag]
-        total += (1 - lag / (width + 1)) * (product + product.T)
-    return total / n
-
-
-def bandwidth(series: Floats) -> float:
-    """Over how many neighbours Bartlett's weights fall to zero: best for autoregressive series."""
-    power = np.maximum((series**2).sum(axis=0), 1e-300)
-    rho = np.clip((series[1:] * series[:-1]).sum(axis=0) / power, -0.97, 0.97)
-    curvature = np.mean(4 * rho**2 / ((1 - rho) ** 2 * (1 + rho) ** 2)) if len(rho) else 0.0
-    return float(1.1447 * (curvature * len(series)) ** (1 / 3))
+    rho = np.clip(persistence(missed), 0.0, 0.97)
+    return float((1 + rho) / (1 - rho))
 
 
 def known_to(given: Camera) -> Floats:
@@ -363,8 +320,16 @@ class Adjustment:
 
     @property
     def factor(self) -> Floats:
-        """`fitted_factor` of the free changes."""
-        return fitted_factor(*self.weighed, self.prior, self.noise)
+        """F, (p, k), of the covariance W = F F' of the free changes."""
+        missed, slopes = self.weighed
+        variance = self.noise**2 * lasting(np.where(np.isfinite(self.misses), missed, np.nan))
+        square = np.einsum("nmk,nml->kl", slopes, slopes) / variance + np.diag(self.prior)
+        size = np.sqrt(np.diag(square))  # of each change: units of pixels, metres and radians
+        size[size == 0] = 1.0
+        values, ways = np.linalg.eigh(square / np.outer(size, size))
+        # Less of the largest information of any direction is rounding.
+        told = values > 1e-15 * values.max(initial=0.0)
+        return ways[:, told] / np.sqrt(values[told]) / size[:, None]
 
 
 class _Reduced(NamedTuple):
@@ -543,14 +508,6 @@ def smooth(tracks: Sequence[Floats], learned: Rig) -> bool:
     return persistence(np.clip(missed, -limit, limit)) > 0.3
 
 
-def persistence(missed: Floats) -> float:
-    """Correlation of residuals, (n, k), with those of the next frame; that of noise is zero."""
-    now, then = missed[:-1], missed[1:]
-    both = np.isfinite(now) & np.isfinite(then)
-    squares = np.sqrt(np.sum(now[both] ** 2) * np.sum(then[both] ** 2))
-    return float(np.sum((now * then)[both]) / max(squares, 1e-300))
-
-
 def _causes(near: Adjustment) -> Iterator[tuple[str, Bools]]:
     """All that is tried, and what it frees; a lens and a shutter of one camera, and of all."""
     parts = {what: PARTS[what] for what in ("position", "scale", "readout", "lag", "drift")}
@@ -573,25 +530,15 @@ def _evidence(near: Adjustment, free: Bools, wanted: Bools, far: bool) -> float:
 
     Where views are far apart, the pixels that it explains.
     """
-    told, own = free | wanted, (wanted & ~free)[free | wanted]
+    told, own, seen = free | wanted, wanted & ~free, np.isfinite(near.misses)
     (rows, target, size), (missed, slopes) = near.system, near.weighed
-    rows, size, slopes = rows[:, told], size[told], slopes[..., told]
-    step = np.linalg.lstsq(rows, target, rcond=1e-10)[0]
-    left = missed + slopes @ (step / size)
-    share = float(np.linalg.norm(left)) / max(float(np.linalg.norm(missed)), 1e-300)
-    factor = fitted_factor(left, slopes, near.prior[told], share * near.noise) * size[:, None]
-    score, _, rank, _ = np.linalg.lstsq(factor[own], step[own], rcond=1e-10)
-    explained = np.sqrt(max(1 - share**2, 0.0) * np.sum(missed**2) / np.isfinite(near.misses).sum())
-    each = np.einsum("nmk,nm->nk", slopes[..., own], left)
-    # Bartlett's weights of that width leave as many degrees of freedom (2/3 is their square's
-    # integral) to estimate the covariance with: Hotelling's T.
-    degrees = 1.5 * len(each) / (bandwidth(each) + 1)
-    rest_degrees = degrees - rank + 1
-    if far:
-        return float(explained)
-    if explained < FINE or rest_degrees <= 0:
-        return 0.0
+    step = np.linalg.lstsq(rows[:, told], target, rcond=1e-10)[0] / size[told]
+    left = missed + slopes[..., told] @ step
+    before, after = np.sum(missed**2), np.sum(left**2)
+    explained = float(np.sqrt(max(before - after, 0.0) / seen.sum()))
+    if far or explained < FINE:
+        return explained if far else 0.0
+    variance = near.noise**2 * after / before * lasting(np.where(seen, left, np.nan))
     # The chance of a T that large without a cause.
-    chance = float(fdtri(rank, rest_degrees, 1 - 1e-6))
-    evidence = float(score @ score) * rest_degrees / (chance * rank * degrees)
+    evidence = float((before - after) / variance / chdtri(own.sum(), 1e-6))
     return evidence if evidence > 1 else 0.0

@@ -38,7 +38,7 @@ from scipy.linalg import polar
 from scipy.optimize import least_squares
 
 from ..arrays import Floats
-from .adjust import PARTS, Adjustment, adjust, known_to, long_run_covariance
+from .adjust import PARTS, Adjustment, adjust, known_to, lasting
 from .clocks import OVERLAP, Footage, Lags, dips, untold_lags
 from .models import AffineCamera, PerspectiveCamera, at_once, missed
 from .rig import ALIKE, BETTER, FINE, GROSS, Rig, check_views
@@ -390,12 +390,12 @@ def _polished(footage: Footage, lags: Floats, rank: int) -> tuple[Floats, Floats
         return np.nan_to_num(_beyond(_images(footage, late, range(count)), rank)).ravel()
 
     found = least_squares(beyond, lags[1:], diff_step=1e-3, max_nfev=_STEPS)
-    information, errors = found.jac.T @ found.jac, np.full(count - 1, np.inf)
+    left, errors = found.fun.reshape(-1, 2 * count), np.full(count - 1, np.inf)
+    information = found.jac.T @ found.jac
     if np.linalg.cond(information) <= 1 / np.finfo(float).eps:
-        each = (found.jac * found.fun[:, None]).reshape(-1, 2 * count, count - 1).sum(axis=1)
-        inverse = np.linalg.inv(information)
-        together = len(each) * inverse @ long_run_covariance(each) @ inverse
-        errors = np.sqrt(np.diag(together))
+        seen = left.any(axis=1)
+        variance = np.sum(left**2) / (seen.sum() * (2 * count - rank)) * lasting(left)
+        errors = np.sqrt(variance * np.diag(np.linalg.inv(information)))
     return np.append(0.0, found.x), np.append(0.0, errors)
 
 
