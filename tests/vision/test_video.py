@@ -222,6 +222,7 @@ def test_the_view_of_a_turned_camera_is_upright(tmp_path, quarters):
         ("a.mov", None, None, {}),  # as we write it, at an even rate
         ("a.mkv", "ffv1", "bgr0", {}),
         ("b.mp4", "libx264", "yuv420p", {"bf": "3", "g": "8"}),
+        ("c.ts", "libx264", "yuv420p", {"bf": "2", "g": "25"}),  # of a camcorder
     ],
 )
 def test_one_frame_is_that_of_all_whatever_the_times(tmp_path, name, codec, pixels, options):

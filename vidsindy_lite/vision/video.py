@@ -518,33 +518,33 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
     """The frames of these increasing numbers, as far as the file holds them.
 
     In a video, the packets say, without being decoded, when each frame is shown and where decoding
-    can begin: a jump meets the right frame, also where frames are not evenly spaced in time.
+    can begin: a jump meets the right frame, also where frames are not evenly spaced in time. Where
+    one does not, as in transport streams, or no times are stated, all frames are decoded.
     """
     if stills := find_stills(check_path("path", path)):
         yield from stills.pick(numbers)
         return
     with _opened(path) as (container, stream):
         packets = _packets(container, stream)
-        times = sorted(time for time, _ in packets if time is not None)
-        if len(set(times)) < len(packets):  # some old files do not say
-            yield from (image for i, image in enumerate(_images(path)) if i in numbers)
-            return
+        times = sorted({time for time, _ in packets if time is not None})
         keys = [time or 0 for time, is_key in packets if is_key]
+        left = [number for number in numbers if number < len(packets)]
         frames: Iterator[VideoFrame] = iter(())
         now = -np.inf
-        for number in numbers:
-            if number >= len(times):
-                return
-            time = times[number]
+        while left and len(times) == len(packets):
+            time = times[left[0]]
             key = max((key for key in keys if key <= time), default=min(keys, default=time))
             if key > now:
                 container.seek(key, stream=stream)
                 frames = _decoded(container, stream)
             frame = next((f for f in frames if f.pts is not None and f.pts >= time), None)
-            if frame is None:
-                return
+            if frame is None or frame.pts > time:
+                break
             now = time
+            del left[0]
             yield _image(frame)
+    if left:
+        yield from (image for i, image in enumerate(_images(path)) if i in left)
 
 
 @contextmanager
