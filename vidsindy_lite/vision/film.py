@@ -187,7 +187,7 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
         colour = np.median([view.colour for view in views if view], axis=0)
         doubts += hint.unlike(colour)
     found, bound = finished(views, film.motion, doubts)
-    found = _filled(found, bound, film, views, looks, ways, seed)
+    found = _filled(found, bound, film, ways, both.frame[rows], seed)
     return replace(found, warnings=found.warnings + unsure(found))
 
 
@@ -457,61 +457,36 @@ def finished(
 
 
 def _filled(
-    found: Track, bound: float, film: Film, views: list[View | None], looks: Looks, ways: Ways,
-    seed: Spot | None,
-) -> Track:  # fmt: skip
-    """A track with its gaps filled: where its motion leads, or where it is by its looks.
+    found: Track, bound: float, film: Film, ways: Ways, path: Ints, seed: Spot | None
+) -> Track:
+    """A track with its gaps filled: where its motion leads, or where both evidences do.
 
-    Where only a part of it shows, its motion is surer, if that is known; else the looks, which are
-    off by the same as in the frames around. What somebody points at is wanted in any case; else
+    These have a place in the frames of the `path`. Its motion is surer, if that is known; else they
+    are off by the same as in the frames around. What somebody points at is wanted in any case; else
     gaps are better, but where whole views are known no better than that, to a `bound`.
     """
-    vague = 2.0  # pixels to which looks tell a place
+    vague = 2.0  # pixels to which they tell a place
     if seed is None and bound < vague:
         return found
-    n, k = len(found.pixels), film.frames.factor
     pixels, confidence = found.pixels.copy(), found.confidence.copy()
-    alike = carry(film.motion.maps[:n], k * looks.box[:, :2] + (k - 1) / 2)
-    side = k * np.sqrt(looks.box[:, 2:].prod(axis=1))
-    reach = 0.6 * side + 2
-    expects = carry(film.motion.maps[:n], ways.centre)
-    with np.errstate(invalid="ignore"):
-        on = np.linalg.norm(alike - expects, axis=1) < reach
+    there = carry(film.motion.maps[: len(pixels)], ways.centre)
+    size = ways.box[:, 2:].mean(axis=1)
     if seed is not None:  # of what somebody points at, no view is of something else
-        stray = np.linalg.norm(pixels - alike, axis=1) > 0.5 * side + 2
+        stray = np.linalg.norm(pixels - there, axis=1) > 0.5 * size + 2
         pixels[stray], confidence[stray] = np.nan, 0
-    good = np.isfinite(pixels[:, 0])
-    usual = np.median(looks.fit[good & on]) if (good & on).any() else 0.5
-    at = np.flatnonzero(good)
-    for i in np.flatnonzero(~good & np.isfinite(ways.centre[:, 0])).tolist():
-        size, view = ways.box[i, 2:].mean(), views[i]
+    at = np.flatnonzero(np.isfinite(pixels[:, 0]))
+    for i in np.setdiff1d(path, at).tolist():
+        confidence[i] = _confidence(vague)
         beside = np.concatenate([at[at < i][-4:], at[at > i][:4]])
         if len(beside) == 8 and np.ptp(beside) < 40:
             # What a cubic misses where the motion turns a quartic shows.
-            other, way, finer = (
+            other, pixels[i], finer = (
                 np.polyfit(beside - i, pixels[beside], degree)[-1] for degree in (2, 3, 4)
             )
-            off = max(np.linalg.norm(way - other), np.linalg.norm(finer - other))
-            known = off < (min(0.25 * size, vague) if seed is None else 0.25 * size)
-            there = carry(film.motion.maps[i], view.centroid[None])[0] if view else np.inf
-            part = np.linalg.norm(there - way) < 0.75 * size
-            like = np.linalg.norm(alike[i] - way) < reach[i]
-            if known and (part or (like and looks.fit[i] > 0.5 * usual)):
-                pixels[i], confidence[i] = way, _confidence(vague)
+            if max(np.linalg.norm(pixels[i] - way) for way in (other, finer)) < 0.25 * size[i]:
                 continue
         near = at[np.argsort(np.abs(at - i), kind="stable")[:15]]
-        if seed is None:
-            if view is None or not (at[0] < i < at[-1]):
-                continue
-            # What hides a part of it draws its looks aside.
-            if not view.inside or view.area < np.median([views[k].area for k in near]) / 1.5:
-                continue
-        pointed = seed is not None and i == seed.frame
-        if not pointed and not (on[i] and looks.fit[i] > (0.7 if seed is None else 0.5) * usual):
-            continue
-        near = near[on[near]]
-        shift = np.median((found.pixels - alike)[near], axis=0) if len(near) > 2 else 0
-        pixels[i], confidence[i] = alike[i] + shift, _confidence(vague)
+        pixels[i] = there[i] + (np.median((pixels - there)[near], axis=0) if len(near) > 2 else 0)
     if not len(at) and np.isfinite(pixels[:, 0]).any():
         return replace(found, pixels=pixels, confidence=confidence, warnings=(_LOOKS_ALONE,))
     return replace(found, pixels=pixels, confidence=confidence)
