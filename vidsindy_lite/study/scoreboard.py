@@ -502,7 +502,7 @@ NOTHING = "nothing"
 
 def _first_law_alone(problem: Any, fit: Any, history: Any) -> Any:
     fit = path.polish(problem, fit, history)
-    return fit, path.follow(problem, fit), True
+    return fit, path.follow(problem, fit)
 
 
 def _same(problem: Any, *_: Any) -> Any:

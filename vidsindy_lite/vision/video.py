@@ -538,7 +538,7 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
                 container.seek(key, stream=stream)
                 frames = _decoded(container, stream)
             frame = next((f for f in frames if f.pts is not None and f.pts >= time), None)
-            if frame is None or frame.pts > time:
+            if frame is None or frame.pts != time:
                 break
             now = time
             del left[0]
