@@ -23,17 +23,15 @@ from .arrays import Floats
 
 T = TypeVar("T")
 
+#: Largest coordinate of a track or a state: the squares of larger ones are no numbers any more.
 FARTHEST = 1e100
-"""Largest coordinate of a track or a state: the squares of larger ones are no numbers any more."""
-LARGEST_SIDE = 32768
-"""Pixels of a camera's image, in width and in height: no sensor has more."""
-LARGEST_INTEGER = 2**63 - 1
-"""Larger ones are none to numpy and to most files."""
+LARGEST_SIDE = 32768  #: Pixels of a camera's image, in width and in height: no sensor has more.
+LARGEST_INTEGER = 2**63 - 1  #: Larger ones are none to numpy and to most files.
+#: What is raised where something from outside is turned into values, and is malformed.
 MALFORMED = (
     ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RuntimeError, ImportError,
     EOFError, MemoryError, SyntaxError, SystemError, BadZipFile, zlib.error, struct.error,
 )  # fmt: skip
-"""What is raised where something from outside is turned into values, and is malformed."""
 
 
 def shown(value: object) -> str:

@@ -568,8 +568,8 @@ def _rig_warnings(
 
 # ---------------------------------------------------------------------------------------- the law
 
+#: Spread across a plane or a line, over the errors of places, up to which a motion stays in it.
 STILL = 1.5
-"""Spread across a plane or a line, over the errors of places, up to which a motion stays in it."""
 _OTHER_CLOCK = 1e-3  # share by which given and stated frame rates may differ without a word
 
 

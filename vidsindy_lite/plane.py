@@ -33,22 +33,17 @@ from .pipeline import (
 )
 from .vision import Hint, check_detector, frame_clock, read_tracks, video_info
 
-MARK = 1.0
-"""Standard error of a mark that is set by hand, in pixels."""
+MARK = 1.0  #: Standard error of a mark that is set by hand, in pixels.
+#: What pulls at all bodies, in metres a second squared, and by how much it differs on earth.
 EARTH, ELSEWHERE = 9.81, 0.03
-"""What pulls at all bodies, in metres a second squared, and by how much it differs on earth."""
-SURE = 3.0
-"""Standard errors from which on a difference is one."""
+SURE = 3.0  #: Standard errors from which on a difference is one.
+#: Standard error of a direction that is set by hand: of a vertical, and of where a camera looks.
 TILTED = np.deg2rad(2.0)
-"""Standard error of a direction that is set by hand: of a vertical, and of where a camera looks."""
+#: Of the vertical of a picture, where no other is given: a telephone is held upright by hand.
 HELD = np.deg2rad(10.0)
-"""Of the vertical of a picture, where no other is given: a telephone is held upright by hand."""
-FOCAL = 0.75
-"""Focal length of a telephone over the longer side of its picture."""
-TABLES = (".csv", ".tsv", ".txt", ".xml", ".dat")
-"""How the names of files end that hold a track."""
-SPACE = np.eye(2, 3)
-"""From places in the plane, (n, 2), to the same in space, (n, 3)."""
+FOCAL = 0.75  #: Focal length of a telephone over the longer side of its picture.
+TABLES = (".csv", ".tsv", ".txt", ".xml", ".dat")  #: How the names of files end that hold a track.
+SPACE = np.eye(2, 3)  #: From places in the plane, (n, 2), to the same in space, (n, 3).
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -225,8 +220,8 @@ def discover_from_video(
     return replace(found, warnings=law.warnings, discovery=law)
 
 
+#: Times, pixels, the number of the first frame, and doubts.
 Seen = tuple[Floats, Floats, int, Sequence[str]]
-"""Times, pixels, the number of the first frame, and doubts."""
 
 
 def _film(

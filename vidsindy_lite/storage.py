@@ -28,14 +28,11 @@ import numpy as np
 
 from .checks import MALFORMED, check_path
 
+#: Bytes of a file of text: more does not fit into the memory that its tree needs.
 LARGEST_TEXT = 500_000_000
-"""Bytes of a file of text: more does not fit into the memory that its tree needs."""
-MOST_DIGITS = 300
-"""Of a number: a longer one is none of ours."""
-DEEPEST = 100
-"""Levels of a tree: OpenCV's readers of deeper ones overflow their stack."""
-TREES = (".toml", ".json", ".yaml", ".yml", ".xml")
-"""Suffixes of files that hold a tree."""
+MOST_DIGITS = 300  #: Of a number: a longer one is none of ours.
+DEEPEST = 100  #: Levels of a tree: OpenCV's readers of deeper ones overflow their stack.
+TREES = (".toml", ".json", ".yaml", ".yml", ".xml")  #: Suffixes of files that hold a tree.
 _HEAD = 4096  # characters that tell text from what is none
 
 
@@ -230,13 +227,13 @@ def _is_running(process: int) -> bool:
 
 NAME = __name__.partition(".")[0]
 PACKAGE = Path(__file__).parent
+#: On whose versions results depend.
 LIBRARIES = (
     "numpy", "scipy", "scikit-learn", "torch", "pysindy", "opencv-python-headless", "av", "pandas",
     "matplotlib", "seaborn",
 )  # fmt: skip
-"""On whose versions results depend."""
+#: Folders and modules of the package that compute no result of a sweep.
 RESULTLESS = ("companion", "plots", "__main__")
-"""Folders and modules of the package that compute no result of a sweep."""
 
 
 def repository_root(start: str | os.PathLike | None = None) -> Path:

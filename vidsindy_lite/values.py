@@ -8,8 +8,8 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 from scipy.interpolate import BSpline
 
+#: Of the numbers of arrays, by numpy's letters.
 KINDS = {"f": np.float64, "i": np.int64, "b": np.bool_}
-"""Of the numbers of arrays, by numpy's letters."""
 
 
 def encoded(value: Any, name: Callable[[type], str], named: tuple[Any, ...] = ()) -> Any:

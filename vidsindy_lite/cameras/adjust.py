@@ -68,6 +68,7 @@ from .models import (
 )
 from .rig import FINE, GROSS, Rig, decimals, residuals
 
+#: Which components of the vector belong to what.
 PARTS = {
     "normal": [0, 1],
     "angle": [2],
@@ -79,11 +80,9 @@ PARTS = {
     "lag": [14],
     "drift": [15],
 }
-"""Which components of the vector belong to what."""
 
 SIZE = 16
-STEPS = 60
-"""That a search takes at most."""
+STEPS = 60  #: That a search takes at most.
 _LARGEST = 50.0  # logarithm of a scale: a step that leads there is not taken
 _TANGENTIAL = 0.1  # p1 and p2 of a lens, in units of k1
 _OUTLIER = 6.0  # sigma

@@ -21,10 +21,8 @@ from scipy.ndimage import minimum_filter1d
 from ..arrays import Bools, Floats
 from ..checks import check_items, check_positive, check_times, check_tracks, check_vector, shown
 
-INSTANTS = 300
-"""At which views are compared before all frames are."""
-OVERLAP = 0.5
-"""Share of the shorter of two videos that both must show."""
+INSTANTS = 300  #: At which views are compared before all frames are.
+OVERLAP = 0.5  #: Share of the shorter of two videos that both must show.
 _NEAR = 7  # lags around one of which the search goes to the best
 _FARTHEST = 1e9  # frames by which a video may start later; and ...
 _FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate

@@ -67,17 +67,12 @@ from ..checks import (
     shown,
 )
 
-ROUNDING = 1e-6
-"""Pixels by which numbers in files and exact tracks are off."""
-SETTLED = 1e-11
-"""Pixels by which a last step of a search moves an image at most."""
-PARALLEL = 1e-6
-"""Sine of the angle below which two lines of sight count as parallel."""
+ROUNDING = 1e-6  #: Pixels by which numbers in files and exact tracks are off.
+SETTLED = 1e-11  #: Pixels by which a last step of a search moves an image at most.
+PARALLEL = 1e-6  #: Sine of the angle below which two lines of sight count as parallel.
 LENS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
-USUAL = 5
-"""How many of these most lenses have; the others are those of a fraction."""
-TRIMMED = 0.9
-"""Share of the instants that must agree; the others may hold anything."""
+USUAL = 5  #: How many of these most lenses have; the others are those of a fraction.
+TRIMMED = 0.9  #: Share of the instants that must agree; the others may hold anything.
 
 _STEPS = 30  # of Newton, from the linear solution: four or five are usual
 _SETTLED = 1e-14  # of the focal length
@@ -735,10 +730,10 @@ class PerspectiveCamera(Camera):
         return self.seen(centres), np.stack(ends, axis=-1) @ shapes @ np.diag(_DOWN)
 
 
+#: The models by their names in the files of rigs.
 MODELS: dict[str, Any] = {
     kind.model: kind for kind in (OrthographicCamera, PerspectiveCamera, AffineCamera)
 }
-"""The models by their names in the files of rigs."""
 
 
 def all_orthographic(cameras: Sequence[Camera]) -> bool:

@@ -76,35 +76,31 @@ from .models import (
     trimmed,
 )
 
+#: Pixels by which a good rig misses at most one frame in ten; even whole-pixel tracks are missed by
+#: less than half of that.
 DISAGREEMENT = 1.0
-"""Pixels by which a good rig misses at most one frame in ten; even whole-pixel tracks are missed by
-less than half of that."""
-ALIKE = 2.0
-"""Ratio of residuals up to which two explanations fit equally well, ..."""
-FINE = 0.05
-"""... and residual in pixels below which all do: real tracks are no better than that."""
-BETTER = 1.25
-"""Ratio of residuals from which on more unknowns are worth it."""
-GROSS = 4.0
-"""Pixels; real calibrations of real tracks leave up to half of that."""
+ALIKE = 2.0  #: Ratio of residuals up to which two explanations fit equally well, ...
+FINE = 0.05  #: ... and residual in pixels below which all do: real tracks are no better than that.
+BETTER = 1.25  #: Ratio of residuals from which on more unknowns are worth it.
+GROSS = 4.0  #: Pixels; real calibrations of real tracks leave up to half of that.
 _FEWEST = 3  # cameras of which nothing is measured
 _MOST = 100  # cameras of a template
 _LOOKS = ("looks_at", "field_of_view", "roll")  # keys that a hand can measure
 _TEXTS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 _KEYS: dict[str, Any] = _TEXTS["keys"]
 _NAMES: dict[str, list[str]] = _KEYS["names"]
+# Keys that mark a camera as one to be left out: if they are set, or if they are not.
 _MARKS = dict.fromkeys(_KEYS["ignored"], True) | dict.fromkeys(_KEYS["used"], False)
-"""Keys that mark a camera as one to be left out: if they are set, or if they are not."""
+# Keys that say which lens it is, ...
 _LENS = re.compile(r"model|lens|projection_?type|^camera_?type")
-"""Keys that say which lens it is, ..."""
+# ... and parts of the names of those that are none of ours.
 _OTHERS = re.compile(
     "fish|equi|kannala|kb4|omni|mei|spher|ucm|unified|fov|atan|scaramuzza|ocam|division|thin|tilt|"
     "ortho|panor|theta|stereograph"
 )
-"""... and parts of the names of those that are none of ours."""
 _LENSES = f"of {', '.join(LENS)}"
+# Keys that are read, and those that change nothing of what a camera sees.
 _KNOWN = {*chain(_KEYS["known"], _MARKS, *_KEYS["sides"], *_NAMES.values())}
-"""Keys that are read, and those that change nothing of what a camera sees."""
 _SKEWED = 5.0  # pixels, at the edge of the image, that are no camera's
 
 

@@ -54,12 +54,11 @@ from .unmeasured import posed
 _PROMISING = 8  # lags of each camera
 _PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
 _TIMES = LAG, DRIFT
-BLURRED = 0.5
-"""Standard error of a lag, in frames, beyond which it counts as unknown."""
+BLURRED = 0.5  #: Standard error of a lag, in frames, beyond which it counts as unknown.
 
 _SHOWN = 3  # of the lags that fit equally well
+#: Rates over those stated that are taken for each other.
 RATES = ((25, 30), (30, 25), (24, 30), (30, 24), (24, 25), (25, 24), (30, 60), (60, 30))
-"""Rates over those stated that are taken for each other."""
 _INSTANTS = 60  # at which two views are compared
 _MISTAKES = 16  # of a kind that mend most, tried with all cameras
 _PART, _PARTS = 0.4, (0.0, 0.3, 0.6)  # of the videos, in which their cameras are learned if frames

@@ -27,10 +27,8 @@ from ..arrays import Floats, Ints
 # for the initial condition.
 
 DEGREE = 3
-WIDTH = DEGREE + 1
-"""Control points that a point of the curve depends on."""
-BESIDE = 1e-3
-"""Distance of a node from a kink, in knot spans: more than rounding moves a time."""
+WIDTH = DEGREE + 1  #: Control points that a point of the curve depends on.
+BESIDE = 1e-3  #: Distance of a node from a kink, in knot spans: more than rounding moves a time.
 
 
 def clamped_knots(breakpoints: Floats) -> Floats:
@@ -314,10 +312,9 @@ def normal_band(rows: sparse.csr_array, weights: Floats | None = None, alike: in
 # They give the first curve and the estimate of the noise. All stretches of data between gaps share
 # one penalty, so that nothing is smoothed across a gap.
 
-PROBES = 24
-"""Random vectors with which the trace of the influence matrix is estimated."""
+PROBES = 24  #: Random vectors with which the trace of the influence matrix is estimated.
+#: Of the squared second derivative, in units of the median time step.
 PENALTIES = 10.0 ** np.arange(-4, 11.6, 0.5)
-"""Of the squared second derivative, in units of the median time step."""
 
 
 @dataclass(frozen=True)

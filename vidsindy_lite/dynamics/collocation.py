@@ -24,11 +24,11 @@ from .bspline import WIDTH, Grid, Segment, normal_band
 from .l0 import RIDGE, equilibrated
 from .library import Function, law_terms, linearised
 
+#: Least noise, relative to the spread of the data, that the splines are trusted to resolve.
 CLEANEST = 1e-5
-"""Least noise, relative to the spread of the data, that the splines are trusted to resolve."""
+#: What rounding does to a banded factor, relative to its largest entry: less could leave it without
+#: a root, more would hold the curve back.
 ROUNDING = 1e-14
-"""What rounding does to a banded factor, relative to its largest entry: less could leave it without
-a root, more would hold the curve back."""
 
 
 @dataclass(frozen=True)

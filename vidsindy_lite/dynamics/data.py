@@ -14,10 +14,10 @@ from ..checks import FARTHEST, check_array, check_items, check_times, shown
 # --------------------------------------------------------------------------------------------------
 # Measured trajectories: checked input, and its cut into stretches without gaps.
 
+#: Lag-1 autocorrelation, in standard errors of white noise, from which on errors are dependent.
 CHANCE = 4.0
-"""Lag-1 autocorrelation, in standard errors of white noise, from which on errors are dependent."""
+#: Times (n,) and states (n, d), NaN where a coordinate was not seen; in each row one was.
 Trajectory = tuple[Floats, Floats]
-"""Times (n,) and states (n, d), NaN where a coordinate was not seen; in each row one was."""
 
 
 def check_trajectory(t: Floats, x: Floats) -> Trajectory:

@@ -42,10 +42,9 @@ from .result import Path
 # shape if its distance from it, less the noise, is nothing of the size of the shape: not because
 # noise may hide it, but because the data are good enough to tell.
 
+#: Share of a size that is none: the scales of coordinates and cameras are off by as much.
 CLOSE = 0.005
-"""Share of a size that is none: the scales of coordinates and cameras are off by as much."""
-PLAIN = 3.0
-"""Standard errors beyond which something stands out from the noise."""
+PLAIN = 3.0  #: Standard errors beyond which something stands out from the noise.
 
 
 def shapes(x: Floats, noise: Floats, names: Sequence[str]) -> Iterator[str]:
@@ -362,8 +361,8 @@ def _higher(exponents: Ints, d: int, most: float) -> Ints:
 # An axis whose origin is that of the data is a claim: of all places in the box of the data it
 # would be just there. It is believed if the data hold it to be so likelier than chance makes it.
 
+#: Which other origin, along which axis, and by how much the criterion rises there.
 Rival = tuple[str, str, float]
-"""Which other origin, along which axis, and by how much the criterion rises there."""
 
 
 def elsewhere(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[Rival]:

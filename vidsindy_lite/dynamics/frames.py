@@ -20,8 +20,8 @@ from .l0 import closest_rival, minimiser, subset_search
 from .library import divides, shift_generators, shift_matrix
 from .problem import FINAL_WEIGHT, Problem
 
+#: An origin, and which of its axes are not where the data have theirs.
 Origin = tuple[Floats, Bools]
-"""An origin, and which of its axes are not where the data have theirs."""
 
 
 @dataclass(frozen=True, eq=False)

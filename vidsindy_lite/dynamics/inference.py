@@ -70,8 +70,7 @@ def intervals(problem: Problem, state: State, model: Linearisation, tolerated: F
 # --------------------------------------------------------------------------------------------------
 # From the last fit to what is told of it: the law in the units and the frame of the data.
 
-KEPT = 1e-12
-"""Penalty of a term that stays whatever its error."""
+KEPT = 1e-12  #: Penalty of a term that stays whatever its error.
 
 
 def infer(

@@ -14,18 +14,15 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 
+#: Share of a column that is not a combination of others, below which it is taken to be one.
 COLLINEAR = 1e-9
-"""Share of a column that is not a combination of others, below which it is taken to be one."""
-NEGLIGIBLE = 1e-6
-"""Changes of the function below this are taken for rounding."""
+NEGLIGIBLE = 1e-6  #: Changes of the function below this are taken for rounding.
+#: Twice the log of odds of 20 to 1: strong evidence for one of two laws (Kass, Raftery 1995).
 STRONG = 6.0
-"""Twice the log of odds of 20 to 1: strong evidence for one of two laws (Kass, Raftery 1995)."""
-FAR = 4.0
-"""Standard errors of a coefficient beyond which another law has another coefficient."""
-LEAST = 1e-300
-"""Keeps a quotient or a logarithm finite where there is nothing."""
+FAR = 4.0  #: Standard errors of a coefficient beyond which another law has another coefficient.
+LEAST = 1e-300  #: Keeps a quotient or a logarithm finite where there is nothing.
+#: Keeps a matrix with dependent columns solvable; what it cannot tell gets a huge variance.
 RIDGE = 1e-12
-"""Keeps a matrix with dependent columns solvable; what it cannot tell gets a huge variance."""
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of columns that are all but combinations

@@ -43,8 +43,7 @@ def velocity_names(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(f"v{name}" for name in names)
 
 
-CLOCK = "t"
-"""The time as a variable of a law: after all others, with dt/dt = 1."""
+CLOCK = "t"  #: The time as a variable of a law: after all others, with dt/dt = 1.
 
 
 def name_latex(name: str) -> str:
@@ -372,8 +371,7 @@ def jumps(value: Callable[[Floats], Floats], t: Floats, halvings: int = 30) -> F
 # own. For given variables it becomes functions of the state, and the exponents of products of
 # coordinates and functions.
 
-OTHERS = "..."
-"""All terms of an equation that are not named."""
+OTHERS = "..."  #: All terms of an equation that are not named.
 
 
 @dataclass(frozen=True)

@@ -25,16 +25,13 @@ from .model import PolynomialSystem, with_error
 # Each number is a function of the law's coefficients, and their covariance is carried through to
 # it to first order (the delta method).
 
-FAINT = 1e-6
-"""Share of the largest entry of a matrix below which an entry is rounding."""
-POINTS = 1001
-"""Points of a curve at which forces and energy are looked at."""
+FAINT = 1e-6  #: Share of the largest entry of a matrix below which an entry is rounding.
+POINTS = 1001  #: Points of a curve at which forces and energy are looked at.
 
+#: When numbers of small swings, of which a law with powers was fitted to large ones, are right.
 IMITATED = "if its powers imitate no other force, as cubics do a sine"
-"""When numbers of small swings, of which a law with powers was fitted to large ones, are right."""
 
-NAME = "angle"
-"""Of the coordinate of what moves on a circle."""
+NAME = "angle"  #: Of the coordinate of what moves on a circle.
 
 Complexes = NDArray[np.complex128]
 

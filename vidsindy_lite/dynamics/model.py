@@ -50,8 +50,8 @@ from .library import (
 # So the integrators here use nothing whose rounding is left to a library of linear algebra.
 
 STAGES = [row[:k, None] for k, row in enumerate(DOP853.A[: DOP853.n_stages])]
+#: Coefficients of the step, and of its errors against steps of order 3 and 5.
 WEIGHTS, THIRD, FIFTH = (row[: len(STAGES), None] for row in (DOP853.B, DOP853.E3, DOP853.E5))
-"""Coefficients of the step, and of its errors against steps of order 3 and 5."""
 
 
 def runge_kutta_4(

@@ -189,12 +189,10 @@ def independent(errors: Floats) -> float:
 # the simplest that explains them (Bayesian information criterion); each measurement then has its
 # own weight, and what is no noise at all has none.
 
+#: Distance from the curve, in standard deviations of the noise there, that no noise reaches.
 GROSS = 6.0
-"""Distance from the curve, in standard deviations of the noise there, that no noise reaches."""
-LIKELY = 20.0
-"""Gain of the criterion from which on a noise is not taken to be even."""
-LARGEST_RATIO = 100.0
-"""Precision of the best measurements over the typical one, at most."""
+LIKELY = 20.0  #: Gain of the criterion from which on a noise is not taken to be even.
+LARGEST_RATIO = 100.0  #: Precision of the best measurements over the typical one, at most.
 
 
 def smoother_weights(problem: Problem) -> Problem:
@@ -280,10 +278,9 @@ def _variance(residual: Floats, causes: Floats, updates: int = 60) -> tuple[floa
 # assimilation, a strong against a weak constraint. And kicks have a spectrum of their own: what
 # lasts, such as a bent space or a law outside the library, is none.
 
+#: Random vectors of a trace (Hutchinson): they leave an error of a hundredth at 1,500 samples.
 PROBES = 8
-"""Random vectors of a trace (Hutchinson): they leave an error of a hundredth at 1,500 samples."""
-OCTAVE = 8
-"""Frequencies of the lowest band of a spectrum; each next one has twice as many."""
+OCTAVE = 8  #: Frequencies of the lowest band of a spectrum; each next one has twice as many.
 
 
 def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem | None:
@@ -449,11 +446,11 @@ def _bands(signal: Floats) -> Floats:
 # takes motion for noise, or gives the motion up and is flat. So terms are fitted at once, as many
 # as converge, and what they leave is the noise; each of the two noises has its law.
 
+#: Error that a first law tolerates, relative to the spread of the data: finer terms come after
+#: those that make the motion.
 TOLERATED = 0.03
-"""Error that a first law tolerates, relative to the spread of the data: finer terms come after
-those that make the motion."""
+#: Errors that a law leaves, over those tolerated when it was chosen, that are still the same.
 CONSISTENT = 1.5
-"""Errors that a law leaves, over those tolerated when it was chosen, that are still the same."""
 
 
 def views(pose: Callable[..., Problem]) -> list[Problem]:

@@ -29,12 +29,11 @@ from .model import Form
 from .problem import Problem, leaves_something_over, tightened, unpruned
 from .result import Discovery
 
-ALIKE = np.deg2rad(2.0)
-"""Orientations that differ by less are one."""
+ALIKE = np.deg2rad(2.0)  #: Orientations that differ by less are one.
 
 Solved = tuple[Discovery, Problem, Fit]
+#: Trajectories, their systematic errors, and their standard errors if they are known.
 Measured = tuple[list[Trajectory], list[Floats], list[Floats] | None]
-"""Trajectories, their systematic errors, and their standard errors if they are known."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -50,17 +50,14 @@ from .problem import (
 )
 from .result import History, Path, Plateau
 
+#: Where errors are smooth, a plateau may begin here: terms below are as likely made by the errors.
+#: Independent errors average out, and whatever they do not explain is a term.
 SMOOTH = 0.1
-"""Where errors are smooth, a plateau may begin here: terms below are as likely made by the errors.
-Independent errors average out, and whatever they do not explain is a term."""
+#: Largest error on a path, that of no law at all; and decades between two laws of a path.
 LARGEST, STEP = 1.0, 0.1
-"""Largest error on a path, that of no law at all; and decades between two laws of a path."""
-ROUNDS = 6
-"""Most laws to which paths lead, each followed around the law before."""
-LONGEST_SEARCH = 10
-"""Most rounds of a subset search, and most moves of an origin."""
-EXACT = 1e-4
-"""Tolerance of the last fits: a hundredth of a standard error, squared."""
+ROUNDS = 6  #: Most laws to which paths lead, each followed around the law before.
+LONGEST_SEARCH = 10  #: Most rounds of a subset search, and most moves of an origin.
+EXACT = 1e-4  #: Tolerance of the last fits: a hundredth of a standard error, squared.
 
 
 def follow(problem: Problem, fit: Fit) -> Path:

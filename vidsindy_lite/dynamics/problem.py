@@ -24,16 +24,16 @@ from .l0 import LEAST
 from .library import Function, extended, jumps, law_terms, monomials
 from .model import Form, PolynomialSystem
 
+#: Chance of a false term in a law, if all candidates were independent: where random laws have about
+#: the fewest wrong terms (notebook 04b).
 FALSE_ALARM = 0.02
-"""Chance of a false term in a law, if all candidates were independent: where random laws have
-about the fewest wrong terms (notebook 04b)."""
+#: The same where samples share errors, which look like evidence for small terms, and elsewhere for
+#: a law that is not to be doubted: a term that is only worth the penalty above is told.
 SURE = 0.004
-"""The same where samples share errors, which look like evidence for small terms, and elsewhere for
-a law that is not to be doubted: a term that is only worth the penalty above is told."""
+#: Penalty of a free axis, in constant terms: of two laws alike, the one with fewer terms wins.
 OFFSET_PENALTY = 0.95
-"""Penalty of a free axis, in constant terms: of two laws alike, the one with fewer terms wins."""
+#: Samples a turn from which on a curve tells the noise to a tenth, and kicks from a drive.
 COARSE = 20
-"""Samples a turn from which on a curve tells the noise to a tenth, and kicks from a drive."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -328,12 +328,10 @@ def spread_to_unseen(noise: Floats, seen: Bools) -> Floats:
 # --------------------------------------------------------------------------------------------------
 # Penalty continuation: fits while the physics weight rises.
 
+#: Physics weights of a fit of all terms, relative to the misfit of a plain regression.
 FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
-"""Physics weights of a fit of all terms, relative to the misfit of a plain regression."""
-WEIGHTS = (1e2, 1e4, 1e8)
-"""Physics weights of a search."""
-FINAL_WEIGHT = WEIGHTS[-1]
-"""Weight at which the law holds exactly for all that the data can tell."""
+WEIGHTS = (1e2, 1e4, 1e8)  #: Physics weights of a search.
+FINAL_WEIGHT = WEIGHTS[-1]  #: Weight at which the law holds exactly for all that the data can tell.
 
 
 def unpruned(problem: Problem, rows: Bools) -> Fit:
@@ -470,8 +468,7 @@ def _telling(form: Form, seen: Bools, u: int) -> tuple[int, int]:
 # --------------------------------------------------------------------------------------------------
 # Poses the problem of a discovery: standard units, gaps, the noise, and the library's units.
 
-GAP = 0.4
-"""A pause longer than this fraction of the time scale of the motion is a gap."""
+GAP = 0.4  #: A pause longer than this fraction of the time scale of the motion is a gap.
 
 
 def pose(

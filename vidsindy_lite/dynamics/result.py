@@ -556,9 +556,9 @@ def unseen(
 # the one that is free. Of a bob on a string it obeys angle'' = -(g / L) sin(angle) - ..., with the
 # angle counted from where the bob would rest.
 
+#: What may pull at an angle and is the same after a full turn: a push, friction, and gravity in any
+#: direction.
 LIBRARY = (Library.polynomial(1) + Library.fourier(1)).where({"vangle": {"angle": 0}})
-"""What may pull at an angle and is the same after a full turn: a push, friction, and gravity in any
-direction."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,37 +29,32 @@ from ..arrays import Floats
 from ..checks import check_integer
 from ..dynamics import PolynomialSystem, Trajectory
 
+#: Grid of thresholds: least magnitude of a coefficient, in the units of the data.
 THRESHOLDS = tuple(np.geomspace(0.01, 10, 13))
-"""Grid of thresholds: least magnitude of a coefficient, in the units of the data."""
+#: Part of the record, from its beginning, that a threshold is fitted to before it is judged.
 TRAINING = 0.8
-"""Part of the record, from its beginning, that a threshold is fitted to before it is judged."""
-TOLERANCE = 1.1
-"""A held-out error of up to this many times the lowest is as good as the lowest."""
+TOLERANCE = 1.1  #: A held-out error of up to this many times the lowest is as good as the lowest.
+#: Ridge penalty of the least squares, in the units of the library. pysindy's default of 0.05 is not
+#: small beside the nearly collinear columns of a shifted cubic library, still less beside the short
+#: integrals of the weak form. On clean data it leaves false terms at every threshold for some of
+#: the systems; under noise neither value is better throughout.
 RIDGE = 1e-9
-"""Ridge penalty of the least squares, in the units of the library.
-
-pysindy's default of 0.05 is not small beside the nearly collinear columns of a shifted cubic
-library, still less beside the short integrals of the weak form. On clean data it leaves false
-terms at every threshold for some of the systems; under noise neither value is better throughout.
-"""
+#: A step longer than this many median steps is a gap; shorter ones are just uneven.
 LONGEST_STEP = 3.0
-"""A step longer than this many median steps is a gap; shorter ones are just uneven."""
+#: Segments of fewer samples are left out: their differences are mostly one-sided.
 SHORTEST_SEGMENT = 5
-"""Segments of fewer samples are left out: their differences are mostly one-sided."""
+#: Windows of the weak form in a whole record; a part of it has its share of them.
 WEAK_WINDOWS = 500
-"""Windows of the weak form in a whole record; a part of it has its share of them."""
+#: Full width of a weak window over the length of the record. Half of pysindy's default: alike on
+#: clean data, better under noise, erratic all the same.
 WEAK_WIDTH = 0.05
-"""Full width of a weak window over the length of the record.
 
-Half of pysindy's default: alike on clean data, better under noise, erratic all the same.
-"""
-
+#: For scikit-learn's ridge regression, whose checks of its arguments take longer than such small
+#: regressions: a fit is handed to it in a dozen parts.
 UNCHECKED = {"check_input": False}
-"""For scikit-learn's ridge regression, whose checks of its arguments take longer than such small
-regressions: a fit is handed to it in a dozen parts."""
 
+#: Values of the candidate terms (k, l) and of the derivatives (k, d): a linear regression.
 Rows = tuple[Floats, Floats]
-"""Values of the candidate terms (k, l) and of the derivatives (k, d): a linear regression."""
 
 
 def stlsq(t: Floats, x: Floats, degree: int = 3, ridge: float = RIDGE) -> PolynomialSystem:
@@ -156,13 +151,13 @@ def model_a(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> PolynomialS
     return _discover(t, x, degree, rows, _least_squares)
 
 
+#: The baselines by the names of the paper's tables; all are called as ``method(t, x)``.
 BASELINES: dict[str, Callable[..., PolynomialSystem]] = {
     "PySINDy": stlsq,
     "E-SINDy": ensemble,
     "WeakSINDy": weak,
     "Model-A": model_a,
 }
-"""The baselines by the names of the paper's tables; all are called as ``method(t, x)``."""
 
 
 def candidates(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> list[PolynomialSystem]:

@@ -25,13 +25,13 @@ from ..checks import (
 )
 from ..dynamics import PolynomialSystem, monomials, runge_kutta_4
 
+#: Length of a random block, as a fraction of the record, and number of fibers, as in the paper.
 BLOCK, FIBERS = 0.01, 5
-"""Length of a random block, as a fraction of the record, and number of fibers, as in the paper."""
+#: Of neighbours in correlated noise, and draws that averaged noise is made of: such noise lasts for
+#: about a tenth of a period of a hundred samples.
 CORRELATION, WIDTH = 0.9, 9
-"""Of neighbours in correlated noise, and draws that averaged noise is made of: such noise lasts for
-about a tenth of a period of a hundred samples."""
+#: Where a coarse path is lost: so many times as far as it began, or after so many calls.
 FARTHEST, MOST_CALLS = 1e6, 50_000
-"""Where a coarse path is lost: so many times as far as it began, or after so many calls."""
 
 
 def add_noise(x: Floats, level: float, rng: np.random.Generator) -> Floats:

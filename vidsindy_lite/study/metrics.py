@@ -11,10 +11,8 @@ from ..arrays import Bools, Floats, Ints
 from ..checks import check_array, shown
 from ..dynamics import Discovery, PolynomialSystem, runge_kutta_4
 
-SUBSTEPS = 8
-"""Runge-Kutta steps between two measurements."""
-VAGUE = 1e4
-"""Prior standard deviation, relative to the size of what is unknown: as good as none."""
+SUBSTEPS = 8  #: Runge-Kutta steps between two measurements.
+VAGUE = 1e4  #: Prior standard deviation, relative to the size of what is unknown: as good as none.
 
 
 @dataclass(frozen=True, eq=False)

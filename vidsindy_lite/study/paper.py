@@ -103,57 +103,55 @@ def _score(row: Sequence) -> PublishedScore:
 
 _PRINTED = tomllib.loads(Path(__file__).with_name("published.toml").read_text("utf-8"))
 
+#: How many datasets the section "Experiments" claims; its footnote lists those of `SYSTEMS_S1`.
 DATASETS_CLAIMED: int = _PRINTED["datasets_claimed"]
-"""How many datasets the section "Experiments" claims; its footnote lists those of `SYSTEMS_S1`."""
 
+#: Lab experiment; the origin is a corner of the table.
 LAB = PublishedPosition(**{name: tuple(point) for name, point in _PRINTED["lab"].items()})
-"""Lab experiment; the origin is a corner of the table."""
 
+#: Table S1 by system, in the printed order.
 SYSTEMS_S1: dict[str, PublishedSystem] = {
     name: PublishedSystem(tuple(system["x0"]), _law(system["law"]))
     for name, system in _PRINTED["table_S1"].items()
 }
-"""Table S1 by system, in the printed order."""
 
+#: Tables 1 and S3 by (table, method, system); both hold the rows of "Ours".
 SCORES: dict[tuple[str, str, str], PublishedScore] = {
     (table, method, system): _score(row)
     for table, key in (("Table 1", "table_1"), ("Table S3", "table_S3"))
     for system, rows in _PRINTED[key].items()
     for method, row in rows.items()
 }
-"""Tables 1 and S3 by (table, method, system); both hold the rows of "Ours"."""
 
+#: Table 2, SprottF, by (condition, rate in percent, method).
 ABLATION: dict[tuple[str, int, str], PublishedScore] = {
     (condition, int(rate), method): _score(row)
     for condition, rates in _PRINTED["table_2"].items()
     for rate, rows in rates.items()
     for method, row in rows.items()
 }
-"""Table 2, SprottF, by (condition, rate in percent, method)."""
 
+#: Table S2 by (method, system), in the paper's reference frame.
 LAWS: dict[tuple[str, str], PolynomialSystem] = {
     (method, system): _law(equations)
     for method, laws in _PRINTED["table_S2"].items()
     for system, equations in laws.items()
 }
-"""Table S2 by (method, system), in the paper's reference frame."""
 
+#: Prints of Table S2 that cannot stand as they are, and how they were read into `LAWS`: method,
+#: system, equation (the name of the variable on the left), printed, read_as.
 MISPRINTS: tuple[dict[str, str], ...] = tuple(_PRINTED["misprints"])
-"""Prints of Table S2 that cannot stand as they are, and how they were read into `LAWS`: method,
-system, equation (the name of the variable on the left), printed, read_as."""
 
+#: What others publish of ``lorenz_grid`` and ``odebench``, with its source and what was given.
 RIVALS: dict[str, dict[str, Any]] = tomllib.loads(
     Path(__file__).with_name("rivals.toml").read_text("utf-8")
 )
-"""What others publish of ``lorenz_grid`` and ``odebench``, with its source and what was given."""
 
 # -------------------------------------------------------------- its systems, and others like them
 
+#: Shift from a system's native frame to the paper's reference frame, in scene units. The paper
+#: never states it; it is what turns its Table S1 into the ground truths of its Table S2.
 REFERENCE_OFFSET = (10.0, 10.0, 0.0)
-"""Shift from a system's native frame to the paper's reference frame, in scene units.
-
-The paper never states it; it is what turns its Table S1 into the ground truths of its Table S2.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,11 +196,11 @@ class Benchmark(PolynomialSystem):
         return t, self.simulate(t, np.array(self.x0))
 
 
+#: Characteristic periods, as in ``dysts``.
 PERIODS = {
     "Lorenz": 1.50, "SprottE": 7.63, "RayleighBenard": 0.920, "SprottF": 19.2, "NoseHoover": 5.87,
     "Tsucs2": 0.345, "WangSun": 6.0,
 }  # fmt: skip
-"""Characteristic periods, as in ``dysts``."""
 
 
 def _benchmark(name: str, law: PolynomialSystem, x0: Sequence[float], period: float) -> Benchmark:
@@ -220,12 +218,13 @@ class _Benchmarks(dict[str, Benchmark]):
         raise KeyError(f"system: must be one of {', '.join(known[::-1])}, got {shown(name)}")
 
 
+#: The systems of Table S1 in their native frame, by name.
 SYSTEMS: dict[str, Benchmark] = _Benchmarks(
     (name, _benchmark(name, SYSTEMS_S1[name].law, SYSTEMS_S1[name].x0, period))
     for name, period in PERIODS.items()
 )
-"""The systems of Table S1 in their native frame, by name."""
 
+#: The same and five other chaotic flows; ``flows.toml`` says where they come from.
 FLOWS: dict[str, Benchmark] = _Benchmarks(
     SYSTEMS
     | {
@@ -235,4 +234,3 @@ FLOWS: dict[str, Benchmark] = _Benchmarks(
         ).items()
     }
 )
-"""The same and five other chaotic flows; ``flows.toml`` says where they come from."""

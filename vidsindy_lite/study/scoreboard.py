@@ -59,8 +59,7 @@ if TYPE_CHECKING:  # pandas is imported where a frame is made
 
 # --------------------------------------------------------------------------------------- ODEBench
 
-TIMES = np.linspace(0, 10, 512)
-"""Of the samples of every equation."""
+TIMES = np.linspace(0, 10, 512)  #: Of the samples of every equation.
 
 _NAMES = {name: getattr(np, name) for name in ("sin", "cos", "tan", "exp", "log", "abs")}
 
@@ -123,21 +122,21 @@ def _equation(number: str, record: Mapping[str, Any]) -> Equation:
     return Equation(int(number), record["name"], record["source"], law or rate, law, starts)
 
 
+#: The equations by number.
 ODEBENCH: dict[int, Equation] = {
     int(number): _equation(number, record)
     for number, record in tomllib.loads(
         Path(__file__).with_name("odebench.toml").read_text("utf-8")
     ).items()
 }
-"""The equations by number."""
 
 
+#: The law of `baselines.candidates` whose path comes closest to the clean one: what SINDy can do if
+#: the truth chooses its threshold and its derivatives.
 ORACLE = "SINDy, oracle"
-"""The law of `baselines.candidates` whose path comes closest to the clean one: what SINDy can do
-if the truth chooses its threshold and its derivatives."""
+#: Gauss-Newton (`dynamics.discover`), the baselines of the paper's tables, and an oracle. Model-A
+#: is SINDy as a careful user has it: derivatives of a smoothing spline.
 CONTESTANTS = ("Gauss-Newton", "PySINDy", "E-SINDy", "WeakSINDy", "Model-A", ORACLE)
-"""Gauss-Newton (`dynamics.discover`), the baselines of the paper's tables, and an oracle. Model-A
-is SINDy as a careful user has it: derivatives of a smoothing spline."""
 
 # --------------------------------------------------------------------------------- kinds of errors
 
@@ -148,6 +147,8 @@ def _outliers(x: Floats, rng: np.random.Generator) -> Floats:
     return corruption.add_outliers(corruption.add_noise(x, 0.02, rng), 0.02, rng)
 
 
+#: Errors of a measurement; a percentage is that of the spread (of the signal for noise that grows,
+#: of the samples for outliers, of the step for jitter, of the range for bent space).
 ERRORS: dict[str, Error] = {
     "white noise 20 %": lambda x, rng: corruption.add_noise(x, 0.2, rng),
     "noise that grows 5 %": lambda x, rng: corruption.add_proportional_noise(x, 0.05, rng),
@@ -159,8 +160,6 @@ ERRORS: dict[str, Error] = {
     "drift 0.2 %": lambda x, rng: corruption.add_drift(x, 0.002, rng),
     "bent space 0.3 %": lambda x, rng: corruption.distort(x, 0.003, rng),
 }
-"""Errors of a measurement; a percentage is that of the spread (of the signal for noise that grows,
-of the samples for outliers, of the step for jitter, of the range for bent space)."""
 
 Motion = Callable[[Benchmark, Floats, Floats, np.random.Generator], Floats]
 
@@ -178,13 +177,13 @@ def _kicked(
     return corruption.kicked_path(flow, t, flow.x0, level * spread / flow.period**0.5, rng)
 
 
+#: Motions that are not quite those of the law: a careless integrator, kicks in percent of the
+#: spread a period.
 MOTIONS: dict[str, Motion] = {
     "coarse steps": _coarse,
     "kicks 1 %": partial(_kicked, 0.01),
     "kicks 5 %": partial(_kicked, 0.05),
 }
-"""Motions that are not quite those of the law: a careless integrator, kicks in percent of the
-spread a period."""
 
 # --------------------------------------------------------------------------------------- contests
 
@@ -496,8 +495,7 @@ def _row(one: Outcome) -> dict[str, object]:
 
 # -------------------------------------------------------------------------------------- ablation
 
-NOTHING = "nothing"
-"""The solver as it is."""
+NOTHING = "nothing"  #: The solver as it is.
 
 
 def _first_law_alone(problem: Any, fit: Any, history: Any) -> Any:
@@ -513,6 +511,7 @@ def _own(problem: Any, fit: Any, *_: Any) -> Any:
     return fit
 
 
+#: Of each mechanism, what takes the place of what.
 WITHOUT: dict[str, tuple[tuple[Any, str, Any], ...]] = {
     NOTHING: (),
     "support path": ((solver, "persistent", _first_law_alone),),
@@ -527,7 +526,6 @@ WITHOUT: dict[str, tuple[tuple[Any, str, Any], ...]] = {
     "free offset": ((path, "framed", _own),),
     "richer laws": ((path, "deepest", lambda problem, around, history: around),),
 }  # fmt: skip
-"""Of each mechanism, what takes the place of what."""
 
 
 @dataclass(frozen=True)

@@ -35,19 +35,17 @@ from ..arrays import Floats, Ints
 from ..checks import check_integer, check_times
 from ..dynamics import DEGREE, PolynomialSystem, monomials
 
+#: Weight of the second differences in the first curve: enough to carry it across gaps.
 ROUGHNESS = 1e-4
-"""Weight of the second differences in the first curve: enough to carry it across gaps."""
-REPORT = 50
-"""Gradient steps between two entries of the history."""
+REPORT = 50  #: Gradient steps between two entries of the history.
+#: Ridge penalty of `stridge`; columns and derivatives are scaled to a root mean square of 1.
 RIDGE = 1e-6
-"""Ridge penalty of `stridge`; columns and derivatives are scaled to a root mean square of 1."""
+#: First threshold of `stridge` and its first step: root mean square of what a term contributes,
+#: over that of the derivative.
 THRESHOLD_STEP = 1e-2
-"""First threshold of `stridge` and its first step: root mean square of what a term contributes,
-over that of the derivative."""
-THRESHOLDS = 100
-"""Number of thresholds that `stridge` tries."""
+THRESHOLDS = 100  #: Number of thresholds that `stridge` tries.
+#: What Adam keeps of its means of gradients and of their squares, as its authors have it.
 MEAN, SQUARE = 0.9, 0.999
-"""What Adam keeps of its means of gradients and of their squares, as its authors have it."""
 
 
 @dataclass(frozen=True, eq=False)

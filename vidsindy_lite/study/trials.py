@@ -48,12 +48,12 @@ if TYPE_CHECKING:  # pandas is imported where a frame is made
 
 # -------------------------------------------------------------------------------------------- films
 
+#: Frames in one characteristic period of a system: playback speed differs per system.
 SAMPLES_PER_PERIOD = 100
-"""Frames in one characteristic period of a system: playback speed differs per system."""
+#: The three videos of a film start at the same time, and whoever filmed them knows.
 TOGETHER = (0.0, 0.0, 0.0)
-"""The three videos of a film start at the same time, and whoever filmed them knows."""
+#: Side in pixels of the square in which the learned detector looks for the target of a film.
 WINDOW = 64
-"""Side in pixels of the square in which the learned detector looks for the target of a film."""
 
 _GRID = 16  # pixels; from one such step to the next the detector's anchors are where they were
 _BATCH = 32  # windows that the detector sees at once
@@ -263,22 +263,22 @@ def film_result(task: FilmTask) -> FilmResult:
 
 # ------------------------------------------------------------------------------------------- trials
 
+#: What a condition does to tracks or to a path, at a level that is a fraction.
 CORRUPTIONS: dict[str, Callable[[Floats, float, np.random.Generator], Floats]] = {
     "noise": add_noise,
     "blocks": drop_blocks,
     "fibers": drop_fibers,
 }
-"""What a condition does to tracks or to a path, at a level that is a fraction."""
 CONDITIONS = ("clean", *CORRUPTIONS)
+#: `dynamics.discover`, the paper's own optimiser (`spline_ado`), and `baselines.BASELINES`.
 METHODS = ("Gauss-Newton", "spline-ADO", "PySINDy", "E-SINDy", "WeakSINDy", "Model-A")
-"""`dynamics.discover`, the paper's own optimiser (`spline_ado`), and `baselines.BASELINES`."""
+#: Where a path comes from, and what a condition is done to: tracks of the learned detector in whole
+#: pixels (the paper's regime), and tracks of the film tracker, before cameras are learned from
+#: them; the path that the latter give; or the simulation.
 SOURCES = ("detector", "sub-pixel", "path", "truth")
-"""Where a path comes from, and what a condition is done to: tracks of the learned detector in
-whole pixels (the paper's regime), and tracks of the film tracker, before cameras are learned
-from them; the path that the latter give; or the simulation."""
 
+#: Relative l2 error below which a few grey levels in the videos decide: tables give it as that.
 LEAST = 1e-5
-"""Relative l2 error below which a few grey levels in the videos decide: tables give it as that."""
 
 
 @dataclass(frozen=True)

@@ -117,8 +117,8 @@ def as_input(images: Image) -> torch.Tensor:
 
 
 SEEN_BACKGROUNDS = ("plain", "sky", "hills", "wood")
+#: What the detector is trained on. The other backgrounds and shapes are kept to test it.
 SEEN_SHAPES = ("disc", "polygon")
-"""What the detector is trained on. The other backgrounds and shapes are kept to test it."""
 STEPS = 2000
 BATCH = 16
 SIDE = 96  # pixels; width and height of a training frame

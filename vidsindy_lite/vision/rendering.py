@@ -36,10 +36,10 @@ from ..checks import (
 )
 from .video import write_video
 
-Size = tuple[int, int]
-"""Width and height in pixels."""
+Size = tuple[int, int]  #: Width and height in pixels.
 SHAPES = ("disc", "polygon", "irregular")
 
+#: Red, green and blue of each target colour: vivid, far from every colour of every background.
 COLOURS = {
     "red": (215, 30, 35),
     "magenta": (200, 30, 185),
@@ -47,10 +47,8 @@ COLOURS = {
     "orange": (250, 115, 5),
     "black": (20, 18, 22),
 }
-"""Red, green and blue of each target colour: vivid, far from every colour of every background."""
 
-Box = tuple[int, int, int, int]
-"""Left, top, width and height in whole pixels."""
+Box = tuple[int, int, int, int]  #: Left, top, width and height in whole pixels.
 _SCANLINES = 16  # per row of pixels, when the target is drawn
 _NORMAL = ndtri((np.arange(2**16) + 0.5) / 2**16).astype(np.float32)  # quantiles, all as likely
 
@@ -155,6 +153,7 @@ def _plain(rng: np.random.Generator, size: Size) -> Image:
     return _paint(light, 4, -4)
 
 
+#: What draws each background: a source of random numbers and (width, height) to an image.
 BACKGROUNDS: dict[str, Callable[[np.random.Generator, Size], Image]] = {
     "plain": _plain,
     "sky": _sky,
@@ -163,7 +162,6 @@ BACKGROUNDS: dict[str, Callable[[np.random.Generator, Size], Image]] = {
     "wood": _wood,
     "bricks": _bricks,
 }
-"""What draws each background: a source of random numbers and (width, height) to an image."""
 
 
 def bark(rng: np.random.Generator, size: Size) -> Image:

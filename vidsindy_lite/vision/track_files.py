@@ -45,12 +45,12 @@ _BINARY = {
     ".mat": "MATLAB's", ".pickle": "a pickle", ".pkl": "a pickle", ".xlsx": "a spreadsheet",
     ".ods": "a spreadsheet", ".kva": "Kinovea's own", ".trk": "Tracker's own", ".npy": "an array",
 }  # fmt: skip
+# Names of columns of several cameras or targets: of DLTdv and Argus, of ours, of poses.
 _SERIES = (
     re.compile(r"(?P<target>.+)_cam(?P<below>_?)(?P<camera>\d+)_(?P<axis>[xy])"),
     re.compile(r"(?P<axis>[uv])_?(?P<camera>\d+)"),
     re.compile(r"(?P<target>.+)\.(?P<axis>x|y|score|likelihood)"),
 )
-"""Names of columns of several cameras or targets: of DLTdv and Argus, of ours, of poses."""
 _TIME = re.compile(
     r"(?:t|times?|timestamp)(?:[ _(\[/]*(s|sec|seconds|ms|msec|us|µs|ns)[)\]]*)?|"
     r"(seconds|milliseconds|ms)"
@@ -62,11 +62,11 @@ _PIXELS = (
     ("u", "v"), ("pixelx", "pixely"), ("x", "y"), ("x_px", "y_px"), ("position_x", "position_y"),
 )  # fmt: skip
 _WHOSE = ("track", "track_id", "particle", "id", "object_id", "tid", "individual")
+# Corner and size of a box, as the names of their columns.
 _SIZED = tuple(product(
     (("x", "y"), ("left", "top"), ("bb_left", "bb_top"), ("u", "v"), ("bbox_x", "bbox_y")),
     (("w", "h"), ("width", "height"), ("bb_width", "bb_height"), ("bbox_w", "bbox_h")),
 ))  # fmt: skip
-"""Corner and size of a box, as the names of their columns."""
 _OPPOSITE = (
     (("x1", "y1"), ("x2", "y2")), (("xmin", "ymin"), ("xmax", "ymax")),
     (("left", "top"), ("right", "bottom")),

@@ -35,14 +35,13 @@ from .film import Track, follow
 from .video import read_video, video_info
 
 DETECTORS = ("auto", "background", "learned")
+#: The weights of the package's own network; detector.json beside it is their training log.
 WEIGHTS = Path(__file__).with_name("detector.pt")
-"""The weights of the package's own network; detector.json beside it is their training log."""
+#: Smallest confidence of a detection. Detectors of this family are modest: the package's own gives
+#: 0.44 to 0.9 to whole targets, more the smaller they are, and less than 0.3 to what is none.
 LEAST = 0.4
-"""Smallest confidence of a detection. Detectors of this family are modest: the package's own gives
-0.44 to 0.9 to whole targets, more the smaller they are, and less than 0.3 to what is none."""
 
-Predictions = Floats32
-"""Centre (u, v), width, height and confidence of each anchor, shape (5, n)."""
+Predictions = Floats32  #: Centre (u, v), width, height and confidence of each anchor, shape (5, n).
 
 
 # ------------------------------------------------------------------------------------------ tracks

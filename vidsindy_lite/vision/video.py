@@ -232,12 +232,10 @@ class _Codec(NamedTuple):
 
     suffixes: tuple[str, ...]
     encoder: str
-    pixels: str
-    """Format of the pixels that it codes."""
+    pixels: str  #: Format of the pixels that it codes.
+    #: Bits per pixel and frame that a lossy codec may use: as many as OpenCV grants it.
     bits: int = 0
-    """Bits per pixel and frame that a lossy codec may use: as many as OpenCV grants it."""
-    options: dict[str, str] = {}
-    """Of the encoder."""
+    options: dict[str, str] = {}  #: Of the encoder.
 
 
 CODECS = {

@@ -19,28 +19,28 @@ from ...arrays import Floats, Image
 from ...cameras import Camera, PerspectiveCamera, Rig
 from ...dynamics import Discovery, PolynomialSystem
 
+#: Axes in space, as matplotlib's ``subplot_kw``.
 SPACE = {"projection": "3d", "proj_type": "ortho"}
-"""Axes in space, as matplotlib's ``subplot_kw``."""
+#: Lines of several curves in one figure.
 STYLES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (7, 2)), (0, (1, 1)))
-"""Lines of several curves in one figure."""
+#: Colour and marker of each method.
 METHOD_STYLES = {
     "Gauss-Newton": {"color": "C0", "marker": "o"}, "spline-ADO": {"color": "C5", "marker": "P"},
     "PySINDy": {"color": "C1", "marker": "s"}, "E-SINDy": {"color": "C2", "marker": "^"},
     "WeakSINDy": {"color": "C3", "marker": "v"}, "Model-A": {"color": "C4", "marker": "D"},
     "SINDy, oracle": {"color": "0.5", "marker": "*"},
 }  # fmt: skip
-"""Colour and marker of each method."""
+#: Colour and hatch of each outcome: is the law exact, and what did the solver say of it.
 VERDICTS = {
     "exact, ok": ("C0", ""),
     "exact, suspect": ("C5", ""),
     "wrong, suspect": ("C4", "//"),
     "wrong, ok": ("C1", "xx"),
 }
-"""Colour and hatch of each outcome: is the law exact, and what did the solver say of it."""
+#: The measured path or the truth, broad, and over it the curve of a law.
 LINES = ({"color": "0.75", "lw": 4}, {"color": "C0", "lw": 1})
-"""The measured path or the truth, broad, and over it the curve of a law."""
+#: The truth, and over it a path with gaps.
 DASHED = ({"color": "0.4", "ls": "--", "lw": 0.8}, {"color": "C0", "lw": 1.4})
-"""The truth, and over it a path with gaps."""
 
 SIGHTS = 5  # instants at which lines of sight are drawn
 DEPTH = 0.15  # of a pinhole's distance from the path: where its image is drawn
