@@ -136,8 +136,7 @@ def throw(rng, frames):
 
 @pytest.mark.parametrize(
     ("path", "frames", "memory", "draws", "most"),
-    # With independent errors taken for granted, the first would spread by 4.
-    [(trajectory, 250, 0.9, 12, 1.3), (throw, 60, 0.0, 40, 1.1)],
+    [(trajectory, 250, 0.9, 12, 1.3), (throw, 60, 0.0, 40, 1.1)],  # if independent, 4 for the first
 )
 def test_errors_of_cameras_are_as_large_as_stated(path, frames, memory, draws, most):
     pulls = []

@@ -113,6 +113,7 @@ def test_the_energy_along_the_path():
     [
         (PolynomialSystem.from_terms({"x": {"x": -1}}), [1], "first order"),
         (law_of(x={"x": 1.0}), [0.1, 0], "nothing holds it"),
+        (law_of(x={"x": -4.0}, y={"1": -1.0}), [1, 0, 0, 0], "no period y: nothing pulls it back"),
         (law_of(DRY, x={"x": -1.0, "sign(vx)": -0.1}), [1, 0], "or a force jumps there: no spring"),
         (law_of(x={"x": -1.0, "vx": -3.0}), [1, 0], "no period: it creeps back"),
         (law_of(x={"x": -1.0, "vx": 0.1}), [1, 0], "no period: what is near rest leaves it"),

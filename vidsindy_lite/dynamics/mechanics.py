@@ -71,10 +71,10 @@ class Physics:
     ----------
     quantities : tuple of Quantity
         Of a body whose forces are the same everywhere: ``g``, its ``direction``, ``drag``, and
-        ``quadratic drag``. Of one with a place of ``rest``: ``spring constant``, ``damping``,
-        ``natural frequency`` (in radians) and ``period`` of small swings about it, unless they
-        grow, of each coordinate, as in ``period x``, or where coordinates pull at each other of
-        each mode, as in ``period 1``, the slowest first.
+        ``quadratic drag``. Of one that is pulled back to a place of ``rest``, or only along some
+        axes: ``spring constant``, ``damping``, ``natural frequency`` (in radians) and ``period`` of
+        small swings about it, unless they grow, of each coordinate, as in ``period x``, or where
+        coordinates pull at each other of each mode, as in ``period 1``, the slowest first.
     energy : tuple of ndarray, shape (n, 2)
         Along each fitted curve, times, and the energy per unit mass over that at rest, or over that
         of rest where the curve begins. Empty if the forces have no potential.
@@ -299,7 +299,10 @@ class _Body:
         return np.where(np.abs(place) < nothing, 0.0, place)
 
     def rest(self) -> Floats | None:
-        """Where forces pull the body back to, no farther off than half of its range; else none."""
+        """Where forces pull the body back to, no farther off than half of its range; else none.
+
+        Along some axes they may pull it nowhere.
+        """
         places = self.states[:, : self.m]
         low, high = places.min(axis=0), places.max(axis=0)
         margin = (high - low) / 2
@@ -308,7 +311,7 @@ class _Body:
             near = (place > low - margin) & (place < high + margin)
             if near.all() and not self.jumps(place):
                 held = np.linalg.eigvals(-self.at_rest(self.law, place)[1]).real
-                if held.min() > FAINT * np.abs(held).max():
+                if held.max() > 0 and held.min() >= -FAINT * held.max():
                     return place
         return None
 
@@ -326,13 +329,14 @@ class _Body:
         alone = _diagonal(pull) and _diagonal(slowed)
         labels = self.axes if alone else [f" {k + 1}" for k in range(self.m)]
         rates = _swings(-pull, -slowed, alone)
-        leaves = rates.real > FAINT * np.abs(rates)
-        swings = (rates.imag > FAINT * np.abs(rates)) & ~leaves
+        leaves, stiff = rates.real > FAINT * np.abs(rates), np.abs(pull).max()
+        free = np.diag(pull) == 0 if alone else np.abs(rates) ** 2 <= FAINT * stiff
+        swings = (rates.imag > FAINT * np.abs(rates)) & ~leaves & ~free
 
         def rule(law: PolynomialSystem) -> dict[str, Floats]:
             place = self.settled(law, rest)
             _, pull, slowed = self.at_rest(law, place)
-            said = {"rest": place}
+            said = {} if free.any() else {"rest": place}
             rates = _swings(-pull, -slowed, alone)
             for j, (label, rate) in enumerate(zip(labels, rates, strict=True)):
                 if alone:
@@ -350,7 +354,7 @@ class _Body:
             yield f"of small swings, {IMITATED}: else name that with library="
         for j in np.flatnonzero(~swings).tolist():
             why = "what is near rest leaves it" if leaves[j] else "it creeps back to rest"
-            yield f"no period{labels[j]}: {why}"
+            yield f"no period{labels[j]}: {'nothing pulls it back' if free[j] else why}"
 
     def energies(
         self, times: Sequence[Floats], paths: Sequence[Floats], rest: Floats | None
