@@ -351,6 +351,13 @@ def times_in(spans, where, number, rng):
     return np.sort((spans[:-1, None] + width * part).ravel())
 
 
+def held_at(grid, times):
+    """The grid with the law at other times, (k,), which count alike."""
+    nodes, slopes = (dynamics.bspline.basis(grid.knots, grid.starts, [times], order=order) for order in (0, 1))
+    alike = np.full(len(times), len(grid.x) / len(times))
+    return replace(grid, nodes=nodes, slopes=slopes, node_times=times, node_weights=alike)
+
+
 # %%
 def law_error(where, per_span, tolerated, trial):
     """Relative error of the true terms, by where and how often in every span the law has to hold."""
@@ -361,7 +368,7 @@ def law_error(where, per_span, tolerated, trial):
     precision, physics = (0.1 * clean.std(axis=0)) ** -2, (tolerated * speed) ** -2
     fit = dynamics.Collocation.of([segment], native.exponents, precision, physics)
     if where != "middles":
-        fit = replace(fit, grid=fit.grid.asked_at([times_in(segment.breakpoints, where, per_span, rng)]))
+        fit = replace(fit, grid=held_at(fit.grid, times_in(segment.breakpoints, where, per_span, rng)))
     control = dynamics.fit_curves(fit, dynamics.smooth([(t, x)], rng).splines)
     begin = dynamics.State(control, native.coefficients, native.support, offset, offset != 0)
     found = fit.solve(begin).state.coefficients
@@ -635,7 +642,7 @@ def start(t, x):
 def continued(t, x):
     state, problem, unmet = start(t, x)
     for alpha in (0.1, 1.0, 10.0, 100.0):
-        problem = problem.weighted(problem.data_weights, alpha / unmet)
+        problem = replace(problem, physics_weights=alpha / unmet)
         state = problem.solve(state, tolerance=1.0).state
         yield alpha, problem, state
 

@@ -39,6 +39,7 @@ level: float = 0.1  # standard deviation of the noise over that of each coordina
 seed: int = 0  # of all noise
 
 # %%
+from dataclasses import replace
 from itertools import product
 
 import matplotlib.pyplot as plt
@@ -98,10 +99,17 @@ def unpruned(t, x):
     coefficients, squares, *_ = np.linalg.lstsq(dynamics.monomials(curve - origin, exponents), slope)
     state = dynamics.State(spline.c, coefficients, np.ones(exponents.shape, bool), origin, np.zeros(3, bool))
     for alpha in (0.1, 1.0, 10.0, 100.0):
-        problem = problem.weighted(problem.data_weights, alpha * len(curve) / squares)
+        problem = replace(problem, physics_weights=alpha * len(curve) / squares)
         state = problem.solve(state, tolerance=1.0).state
     information = problem.linearise(state, np.arange(exponents.size)).information
-    return dynamics.ShiftedLaw(exponents, state.coefficients, information), state
+    return (state.coefficients, information), state
+
+
+def moved(algebra, shift):
+    """The same law of all terms, and its information, written from another origin: exactly."""
+    forth, back = (dynamics.shift_matrix(exponents, by) for by in (-shift, shift))
+    back = np.kron(np.eye(3), back)  # in each equation
+    return forth @ algebra[0], back.T @ algebra[1] @ back
 
 
 # %% [markdown]
@@ -109,8 +117,7 @@ def unpruned(t, x):
 # have, for any $\boldsymbol\lambda$, what the fit would lose: $(\boldsymbol\lambda-\mathbf c)^T
 # \mathbf S\,(\boldsymbol\lambda-\mathbf c)$. That is a small regression problem, and a threshold or
 # a search can be tried on it. `subset_search` drops, adds and swaps single terms as long as
-# the loss plus a penalty per term falls; the penalties (`term_penalties`) are the same for all systems. A `ShiftedLaw` is
-# law and information together; its method `at` writes both from another origin.
+# the loss plus a penalty per term falls; the penalties (`term_penalties`) are the same for all systems.
 
 # %%
 penalty = np.tile(dynamics.term_penalties(exponents), 3)
@@ -122,7 +129,7 @@ def flat_support(law):
 
 
 def search(algebra, shift):
-    coefficients, S, _ = algebra.at(shift)
+    coefficients, S = moved(algebra, shift)
     c = coefficients.T.ravel()
     support, solution, _ = dynamics.subset_search(S, 0 * c, c, penalty, np.ones(len(c), dtype=bool))
     return c, S, support, solution
@@ -502,7 +509,7 @@ x_axis = y_axis = np.linspace(-10, 30, 81)
 
 
 def count(x0, y0):
-    law, information, _ = algebra.at(np.array([x0, y0, 0.0]) - fit.offset)
+    law, information = moved(algebra, np.array([x0, y0, 0.0]) - fit.offset)
     scale = np.sqrt(np.diag(information))
     covariance = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)
     z_squared = law.T.ravel() ** 2 / np.diag(covariance)

@@ -21,10 +21,9 @@ from .collocation import Collocation, Status
 from .result import Discovery
 from .model import Form
 from .model import runge_kutta_4
-from .library import Function, monomial_exponents, monomials
+from .library import Function, monomial_exponents, monomials, shift_matrix
 from .diagnostics import CLOSE
 from .solver import check_order
-from .frames import ShiftedLaw
 from .homogeneous import homogeneous
 from .result import Swing
 from .model import PolynomialSystem

@@ -205,17 +205,6 @@ class Grid:
             node_weights=width / width.sum() * len(x),
         )
 
-    def asked_at(self, times: Sequence[Floats]) -> Grid:
-        """The same with the law at other times of each segment, which count alike."""
-        count = sum(map(len, times))
-        return replace(
-            self,
-            nodes=basis(self.knots, self.starts, times),
-            slopes=basis(self.knots, self.starts, times, order=1),
-            node_times=np.concatenate(times),
-            node_weights=np.full(count, len(self.x) / count),
-        )
-
     @property
     def runs(self) -> Ints:
         """The trajectory to which each node belongs, (k,)."""

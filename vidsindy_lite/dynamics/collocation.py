@@ -255,10 +255,6 @@ class Collocation:
         known = np.zeros((len(exponents), grid.x.shape[1]))
         return cls(grid, exponents, data, seen, physics, none, known)
 
-    def weighted(self, data_weights: Floats, physics_weights: Floats) -> Collocation:
-        """The same with other weights of the data and of the law."""
-        return replace(self, data_weights=data_weights, physics_weights=physics_weights)
-
     @property
     def d(self) -> int:
         """Dimension of the state."""

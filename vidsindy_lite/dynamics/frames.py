@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,35 +22,6 @@ from .problem import FINAL_WEIGHT, Problem
 
 #: An origin, and which of its axes are not where the data have theirs.
 Origin = tuple[Floats, Bools]
-
-
-@dataclass(frozen=True, eq=False)
-class ShiftedLaw:
-    """Coefficients and information of an estimated law in shifted frames, exactly.
-
-    Parameters
-    ----------
-    exponents : ndarray of int, shape (l, d + k)
-        A library that holds all divisors of its monomials.
-    coefficients : ndarray, shape (l, d)
-        Estimate in the present frame.
-    information : ndarray, shape (l d, l d)
-        Its information matrix, equation by equation.
-    gradient : ndarray, shape (l d,), optional
-        What still pulls at the coefficients (see `subset_search`); nothing by default.
-    """
-
-    exponents: Ints
-    coefficients: Floats
-    information: Floats
-    gradient: Floats | None = None
-
-    def at(self, origin: Floats) -> tuple[Floats, Floats, Floats]:
-        """Coefficients (l, d), information and gradient in monomials of ``x - origin``."""
-        forth = shift_matrix(self.exponents, -origin)
-        back = np.kron(np.eye(len(origin)), shift_matrix(self.exponents, origin))
-        pull = np.zeros(len(back)) if self.gradient is None else back.T @ self.gradient
-        return forth @ self.coefficients, back.T @ self.information @ back, pull
 
 
 @np.errstate(all="ignore")  # of moves that lead nowhere
@@ -127,19 +98,18 @@ def laws_at(
     information = np.diag(np.where(state.free()[: -problem.d], 0.0, 1e30))
     model, gradient = whole.collocation.linearise(state, columns), np.zeros(len(information))
     information[np.ix_(columns, columns)], gradient[columns] = model.information, model.gradient
-    law = ShiftedLaw(problem.exponents, state.coefficients, information, gradient=gradient)
     objective, size = whole.collocation.objective(state), len(columns)
     generators = shift_generators(problem.exponents)
 
     def at(origin: Floats, moving: Bools) -> Iterator[Fit]:
-        coefficients, information, gradient = law.at(origin)
+        coefficients = shift_matrix(problem.exponents, -origin) @ state.coefficients
+        back = np.kron(np.eye(problem.d), shift_matrix(problem.exponents, origin))
         axes = np.flatnonzero(moving & free)
         rates = -generators[axes] @ coefficients
         flat_rates = rates.swapaxes(1, 2).reshape(-1, coefficients.size)
-        ways = np.vstack([np.eye(size), flat_rates[:, columns]])
+        ways = np.vstack([np.eye(size), flat_rates[:, columns]]) @ back.T[columns]
         present = np.append(coefficients.T.ravel()[columns], np.zeros(len(axes)))
-        information = ways @ information[np.ix_(columns, columns)] @ ways.T
-        quadratic = information, ways @ gradient[columns], present
+        quadratic = ways @ information @ ways.T, ways @ gradient, present
         penalties = np.append(problem.entry_penalties[columns], np.full(len(axes), -np.inf))
 
         def told(solution: Floats, value: float) -> Fit:
