@@ -33,8 +33,9 @@ cause, the squares that one step saves with it free are compared with those that
 
     T = (sum r^2 - sum r_c^2) / (tau_c sigma_c^2),
 
-which is chi-squared of as many degrees as the cause has components where there is none.
-With the cause that stands out most free, cameras and path are adjusted.
+what was measured with an error free in both. Where there is no cause that is chi-squared of as many
+degrees as it has components. With the cause that stands out most free, cameras and path are
+adjusted.
 
 Bartlett 1946, J. R. Stat. Soc. Suppl. 8 (tau); Triggs et al. 2000, "Bundle adjustment: a modern
 synthesis".
@@ -529,15 +530,20 @@ def _evidence(near: Adjustment, free: Bools, wanted: Bools, far: bool) -> float:
 
     Where views are far apart, the pixels that it explains.
     """
-    told, own, seen = free | wanted, wanted & ~free, np.isfinite(near.misses)
     (rows, target, size), (missed, slopes) = near.system, near.weighed
-    step = np.linalg.lstsq(rows[:, told], target, rcond=1e-10)[0] / size[told]
-    left = missed + slopes[..., told] @ step
-    before, after = np.sum(missed**2), np.sum(left**2)
-    explained = float(np.sqrt(max(before - after, 0.0) / seen.sum()))
+
+    def left(told: Bools) -> Floats:
+        """What a step in some of the changes leaves of the residuals."""
+        step = np.linalg.lstsq(rows[:, told], target, rcond=1e-10)[0] / size[told]
+        return missed + slopes[..., told] @ step
+
+    rest, seen = left(free | wanted), np.isfinite(near.misses)
+    after, saved = np.sum(rest**2), np.sum(left(free) ** 2) - np.sum(rest**2)
+    explained = float(np.sqrt(max(saved, 0.0) / seen.sum()))
     if far or explained < FINE:
         return explained if far else 0.0
-    variance = near.noise**2 * after / before * lasting(np.where(seen, left, np.nan))
+    share = after / np.sum(missed**2)
+    variance = share * near.noise**2 * lasting(np.where(seen, rest, np.nan))
     # The chance of a T that large without a cause.
-    evidence = float((before - after) / variance / chdtri(own.sum(), 1e-6))
+    evidence = float(saved / variance / chdtri((wanted & ~free).sum(), 1e-6))
     return evidence if evidence > 1 else 0.0
