@@ -107,13 +107,13 @@ def unpruned(t, x):
 
 def moved(algebra, shift):
     """The same law of all terms, and its information, written from another origin: exactly."""
-    forth, back = (dynamics.shift_matrix(exponents, by) for by in (-shift, shift))
+    (coefficients, information), back = algebra, dynamics.shift_matrix(exponents, shift)
     back = np.kron(np.eye(3), back)  # in each equation
-    return forth @ algebra[0], back.T @ algebra[1] @ back
+    return dynamics.shift_matrix(exponents, -shift) @ coefficients, back.T @ information @ back
 
 
 # %% [markdown]
-# With coefficients $\mathbf c$ and information $\mathbf S$ (both moved to the reference frame, exactly) we
+# With coefficients $\mathbf c$ and information $\mathbf S$ (both `moved` to the reference frame, exactly) we
 # have, for any $\boldsymbol\lambda$, what the fit would lose: $(\boldsymbol\lambda-\mathbf c)^T
 # \mathbf S\,(\boldsymbol\lambda-\mathbf c)$. That is a small regression problem, and a threshold or
 # a search can be tried on it. `subset_search` drops, adds and swaps single terms as long as

@@ -405,7 +405,7 @@ print(f"spline-ADO with up to 50 % in blocks or 20 % in fibers missing: {rate(he
 assert held.mean() >= 0.8 or not full
 
 # %% [markdown]
-# Our solver is taken apart in the same way, with errors that are not white, in [notebook 11](11_scoreboard.ipynb#our-solver-taken-apart).
+# Our solver is taken apart, too, mechanism by mechanism, in [notebook 11](11_scoreboard.ipynb#our-solver-taken-apart).
 #
 # ## The second protocol: noise and gaps in the path
 #

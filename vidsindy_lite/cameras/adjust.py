@@ -21,7 +21,7 @@ start.
 Errors of tracks depend on their neighbours. With the slopes J of the residuals r, their noise sigma
 and the information P of measurements, what was fitted has the covariance
 
-    W = (sum_n J_n' J_n / (tau sigma^2) + P)^-1,
+    W = A^-1 (tau N + P) A^-1,   N = sum_n J_n' J_n / sigma^2,   A = N + P,
 
 tau the integrated autocorrelation time of the residuals, (1 + rho) / (1 - rho) with their
 correlation rho from frame to frame: tau frames tell as much as one of independent errors.
@@ -33,9 +33,9 @@ cause, the squares that one step saves with it free are compared with those that
 
     T = (sum r^2 - sum r_c^2) / (tau_c sigma_c^2),
 
-what was measured with an error free in both. Where there is no cause that is chi-squared of as many
-degrees as it has components. With the cause that stands out most free, cameras and path are
-adjusted.
+r what a step leaves with all free that was measured with an error, r_c with the cause as well, and
+tau_c and sigma_c of r_c. Where there is no cause, T is chi-squared of as many degrees as the cause
+has components. With the cause that stands out most free, cameras and path are adjusted.
 
 Bartlett 1946, J. R. Stat. Soc. Suppl. 8 (tau); Triggs et al. 2000, "Bundle adjustment: a modern
 synthesis".
@@ -322,14 +322,17 @@ class Adjustment:
     def factor(self) -> Floats:
         """F, (p, k), of the covariance W = F F' of the free changes."""
         missed, slopes = self.weighed
-        variance = self.noise**2 * lasting(np.where(np.isfinite(self.misses), missed, np.nan))
-        square = np.einsum("nmk,nml->kl", slopes, slopes) / variance + np.diag(self.prior)
+        tau = lasting(np.where(np.isfinite(self.misses), missed, np.nan))
+        square = np.einsum("nmk,nml->kl", slopes, slopes) / self.noise**2 + np.diag(self.prior)
         size = np.sqrt(np.diag(square))  # of each change: units of pixels, metres and radians
         size[size == 0] = 1.0
         values, ways = np.linalg.eigh(square / np.outer(size, size))
         # Less of the largest information of any direction is rounding.
         told = values > 1e-15 * values.max(initial=0.0)
-        return ways[:, told] / np.sqrt(values[told]) / size[:, None]
+        # In the directions of `half`, A is the unit matrix.
+        half = ways[:, told] / np.sqrt(values[told]) / size[:, None]
+        measured = half.T @ (self.prior[:, None] * half)
+        return half @ np.linalg.cholesky(tau * np.eye(len(measured)) - (tau - 1) * measured)
 
 
 class _Reduced(NamedTuple):

@@ -394,7 +394,8 @@ def _polished(footage: Footage, lags: Floats, rank: int) -> tuple[Floats, Floats
     information = found.jac.T @ found.jac
     if np.linalg.cond(information) <= 1 / np.finfo(float).eps:
         seen = left.any(axis=1)
-        variance = np.sum(left**2) / (seen.sum() * (2 * count - rank)) * lasting(left)
+        tau = lasting(np.where(seen[:, None], left, np.nan))
+        variance = tau * np.sum(left**2) / (seen.sum() * (2 * count - rank))
         errors = np.sqrt(variance * np.diag(np.linalg.inv(information)))
     return np.append(0.0, found.x), np.append(0.0, errors)
 

@@ -71,13 +71,15 @@ class Physics:
     ----------
     quantities : tuple of Quantity
         Of a body whose forces are the same everywhere: ``g``, its ``direction``, ``drag``, and
-        ``quadratic drag``. Of one that is pulled back to a place of ``rest``, or only along some
-        axes: ``spring constant``, ``damping``, ``natural frequency`` (in radians) and ``period`` of
-        small swings about it, unless they grow, of each coordinate, as in ``period x``, or where
-        coordinates pull at each other of each mode, as in ``period 1``, the slowest first.
+        ``quadratic drag``. Of one that is pulled back to a place of ``rest``, or, without
+        that, along some axes: ``spring constant``, ``damping``, ``natural frequency`` (in radians)
+        and ``period`` of small swings about it, unless they grow, of each coordinate, as in
+        ``period x``, or where coordinates pull at each other of each mode, as in ``period 1``, the
+        slowest first.
     energy : tuple of ndarray, shape (n, 2)
-        Along each fitted curve, times, and the energy per unit mass over that at rest, or over that
-        of rest where the curve begins. Empty if the forces have no potential.
+        Along each fitted curve, times, and the energy per unit mass over that at rest (along free
+        axes, in the middle of the motion), or over that of rest where the curve begins. Empty if
+        the forces have no potential.
     notes : tuple of str
         How the energy changes; what cannot be said, and why.
     """
@@ -310,8 +312,11 @@ class _Body:
             place = self.settled(self.law, start)
             near = (place > low - margin) & (place < high + margin)
             if near.all() and not self.jumps(place):
-                held = np.linalg.eigvals(-self.at_rest(self.law, place)[1]).real
-                if held.max() > 0 and held.min() >= -FAINT * held.max():
+                held, ways = np.linalg.eig(-self.at_rest(self.law, place)[1])
+                most, free = held.real.max(), np.abs(held) <= FAINT * held.real.max()
+                # Where they pull nowhere, they do so at all places.
+                slopes = self.force(self.law, self.states)[1] @ ways[:, free]
+                if held.real[~free].min(initial=most) > 0 and (abs(slopes) <= FAINT * most).all():
                     return place
         return None
 
@@ -392,7 +397,10 @@ def _swings(stiffness: Floats, damping: Floats, alone: bool) -> Complexes:
         return -half + 1j * np.sqrt(np.maximum(np.diag(stiffness) - half**2, 0.0))
     pair = np.block([[np.zeros((m, m)), np.eye(m)], [-stiffness, -damping]])
     rates = np.linalg.eigvals(pair)
-    return rates[np.argsort(np.where(rates.imag >= 0, np.abs(rates), np.inf))][:m]
+    rates = rates[np.argsort(np.abs(rates))]
+    turning, real = rates[rates.imag > 0], rates[rates.imag == 0]  # of two real ones the slower
+    both = np.append(turning, real[: m - len(turning)])
+    return both[np.argsort(np.abs(both))]
 
 
 def _diagonal(matrix: Floats) -> bool:

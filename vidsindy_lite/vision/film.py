@@ -457,13 +457,13 @@ def finished(
 
 
 def _filled(
-    found: Track, bound: float, film: Film, ways: Ways, path: Ints, seed: Spot | None
+    found: Track, bound: float, film: Film, ways: Ways, frames: Ints, seed: Spot | None
 ) -> Track:
     """A track with its gaps filled: where its motion leads, or where both evidences do.
 
-    These have a place in the frames of the `path`. Its motion is surer, if that is known; else they
-    are off by the same as in the frames around. What somebody points at is wanted in any case; else
-    gaps are better, but where whole views are known no better than that, to a `bound`.
+    These have a place in the `frames` of their path. Its motion is surer, if that is known; else
+    they are off by the same as in the frames around. What somebody points at is wanted in any case;
+    else gaps are better, but where whole views are known no better than that, to a `bound`.
     """
     vague = 2.0  # pixels to which they tell a place
     if seed is None and bound < vague:
@@ -475,15 +475,17 @@ def _filled(
         stray = np.linalg.norm(pixels - there, axis=1) > 0.5 * size + 2
         pixels[stray], confidence[stray] = np.nan, 0
     at = np.flatnonzero(np.isfinite(pixels[:, 0]))
-    for i in np.setdiff1d(path, at).tolist():
+    known = frames[np.isfinite(film.motion.errors[frames])]
+    for i in np.setdiff1d(known, at).tolist():
         confidence[i] = _confidence(vague)
         beside = np.concatenate([at[at < i][-4:], at[at > i][:4]])
         if len(beside) == 8 and np.ptp(beside) < 40:
             # What a cubic misses where the motion turns a quartic shows.
-            other, pixels[i], finer = (
+            other, way, finer = (
                 np.polyfit(beside - i, pixels[beside], degree)[-1] for degree in (2, 3, 4)
             )
-            if max(np.linalg.norm(pixels[i] - way) for way in (other, finer)) < 0.25 * size[i]:
+            if max(np.linalg.norm(way - other), np.linalg.norm(way - finer)) < 0.25 * size[i]:
+                pixels[i] = way
                 continue
         near = at[np.argsort(np.abs(at - i), kind="stable")[:15]]
         pixels[i] = there[i] + (np.median((pixels - there)[near], axis=0) if len(near) > 2 else 0)

@@ -116,8 +116,8 @@ def as_input(images: Image) -> torch.Tensor:
     return planes.float().div_(255)  # permuted, the channels stay last in memory: the fast order
 
 
-SEEN_BACKGROUNDS = ("plain", "sky", "hills", "wood")
 #: What the detector is trained on. The other backgrounds and shapes are kept to test it.
+SEEN_BACKGROUNDS = ("plain", "sky", "hills", "wood")
 SEEN_SHAPES = ("disc", "polygon")
 STEPS = 2000
 BATCH = 16

@@ -529,7 +529,8 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
         left = [number for number in numbers if number < len(packets)]
         frames: Iterator[VideoFrame] = iter(())
         now = -np.inf
-        while left and len(times) == len(packets):
+        whole = len(times) == len(packets) and min(keys, default=0) <= min(times, default=0)
+        while left and whole:
             time = times[left[0]]
             key = max((key for key in keys if key <= time), default=min(keys, default=time))
             if key > now:
@@ -541,8 +542,8 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
             now = time
             del left[0]
             yield _image(frame)
-    if left:
-        yield from (image for i, image in enumerate(_images(path)) if i in left)
+    every = zip(range(max(left, default=-1) + 1), _images(path), strict=False)
+    yield from (image for number, image in every if number in left)
 
 
 @contextmanager
