@@ -105,6 +105,7 @@ def unpruned(t, x):
     return (state.coefficients, information), state
 
 
+# %%
 def moved(algebra, shift):
     """The same law of all terms, and its information, written from another origin: exactly."""
     (coefficients, information), back = algebra, dynamics.shift_matrix(exponents, shift)
