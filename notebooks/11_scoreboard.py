@@ -24,8 +24,7 @@
 # * ODEBench: 63 equations from textbooks, whose stored trajectories err smoothly;
 # * the Lorenz system over noise and length, beside the best published method;
 # * eight chaotic flows with drift, outliers, coarse steps, correlated noise, kicks;
-# * for each: how often the law is exact, how often it is wrong and nothing said so, how long it takes;
-# * which mechanism of our solver is needed for what.
+# * for each: how often the law is exact, how often it is wrong and nothing said so, how long it takes.
 #
 # **Afterwards you can** say on which data which method finds the law, and which of them warns when it does not.
 #
@@ -41,7 +40,6 @@ jobs: int = 2  # contests at a time
 
 # %%
 from dataclasses import replace
-from itertools import product
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -58,10 +56,7 @@ from vidsindy_lite.study import (
     FlowContest,
     LorenzContest,
     OdeContest,
-    ablation_table,
-    ablations,
     plots,
-    run_ablation,
     run_contest,
     standings,
     sweep,
@@ -366,27 +361,6 @@ if full:
     assert rate_flows["Gauss-Newton"].mean() > rate_flows.PySINDy.mean() + 0.15
 
 # %% [markdown]
-# ## Our solver, taken apart
-#
-# The paper takes the core out of its method; so do we, mechanism by mechanism. While a contest runs, what does the work of one of them
-# is replaced by what does nothing. *Lost* are laws that are exact with it and not without. The contests are shorter flows whose
-# errors are not white, or which are not quite those of the law, and the cubic equations of ODEBench, as stored, and with noise in the one
-# sample of ten that is left.
-
-# %%
-kinds = ("drift 0.2 %", "bent space 0.3 %", "correlated noise 5 %", "outliers 2 %", "coarse steps", "clock jitter 30 %", "kicks 5 %")
-short = ("Roessler", "Arneodo", "Halvorsen") if full else ("Halvorsen",)
-bent = [FlowContest(flow, kind, 800, seed=seed + 40) for flow, kind in product(short, kinds if full else kinds[:1])]
-sparse = [OdeContest(n, 0, *how, seed=seed) for how in ((0, 0), (0.02, 0.9)) for n in cubic] if full else []
-tasks = list(ablations([*bent, *sparse]))
-apart = ablation_table(sweep(run_ablation, tasks if full else tasks[::8], jobs=jobs, desc="taken apart"))
-
-caption = f"Exact laws of {len(bent)} contests of flows and {len(sparse)} of ODEBench without each mechanism of the solver."
-save_table("table_solver_ablation", apart.reset_index().to_dict("records"), caption=caption, tolerance={"seconds": 1e9})
-
-# %% [markdown]
-# *A mechanism whose row does not differ from the first one does not show in these contests.*
-#
 # ## How far can the status be trusted?
 #
 # All contests of this page together.
@@ -460,7 +434,7 @@ if full:
 # %% [markdown]
 # ## Run time and versions
 #
-# All cells take about 20 minutes on two cores.
+# All cells take about 10 minutes on two cores.
 
 # %%
 print(versions())

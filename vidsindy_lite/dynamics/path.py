@@ -104,18 +104,19 @@ def _plateaus(equation: int, levels: list[float], laws: Bools) -> tuple[Plateau,
 # ------------------------------------------------------------------------------------ a first law
 
 
-def first_law(problem: Problem, history: History) -> Fit:
+def first_law(problem: Problem, history: History, tolerated: float | None = None) -> Fit:
     """A law at a large tolerated error: of terms of low degree, and of all if these miss something.
 
-    The error is `TOLERATED`, relative to the spread of the data; where the noise is larger, that is
-    tolerated, and process noise is as it is. Of long data it is the law of a part, if that fits
-    all.
+    The error is relative to the spread of the data, `TOLERATED` by default; where the noise is
+    larger, that is tolerated, and kicks are as they are. Of long data it is the law of a part, if
+    that fits all.
     """
-    noise = problem.noise if problem.has_process_noise else np.maximum(problem.noise, TOLERATED)
+    least = TOLERATED if tolerated is None else tolerated
+    noise = problem.noise if problem.has_process_noise else np.maximum(problem.noise, least)
     tolerant, part = replace(problem, noise=noise), problem.part()
     if part is not problem:
         its_own = replace(history, bar=None)  # rounds of a part are none of those that it counts
-        law, _ = persistent(part, first_law(part, its_own), its_own)
+        law, *_ = persistent(part, first_law(part, its_own, tolerated), its_own)
         collocation = tolerant.collocation(tolerant.segments())
         state = replace(law.state, control_points=fit_curves(collocation, problem.curves))
         fit = tightened(tolerant, collocation, state)
@@ -210,7 +211,7 @@ def _moved(problem: Problem, fit: Fit, origins: Sequence[Origin], history: Histo
 # ---------------------------------------------------------------------------- the law that persists
 
 
-def persistent(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
+def persistent(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path, bool]:
     """The law whose terms are those of the widest plateaus of the path around it, and that path.
 
     Parameters
@@ -223,9 +224,10 @@ def persistent(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]
     Returns
     -------
     fit : Fit
-        If no path leads to the law around which it is, the last to which one led.
     path : Path
         Around it.
+    persists : bool
+        Whether the path leads to the law; else it is the last to which one led.
     """
     for k in range(ROUNDS):
         coarse = k > 0 or not near(problem, fit, TOLERATED)
@@ -237,7 +239,7 @@ def persistent(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]
             fit = polish(problem, fit, history)
             path = follow(problem, fit)
         if has_terms(fit, path.widest()):
-            return fit, path
+            return fit, path, fit.status is Status.CONVERGED
         other = refit(problem, path, history)
         stays = fit.status is Status.CONVERGED
         if other is None or (stays and other.status is not Status.CONVERGED):
@@ -246,7 +248,8 @@ def persistent(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]
         if not history.another():
             break
     fit = polish(problem, fit, history)
-    return fit, follow(problem, fit)
+    path = follow(problem, fit)
+    return fit, path, fit.status is Status.CONVERGED and has_terms(fit, path.widest())
 
 
 def near(problem: Problem, fit: Fit, tolerated: float = 0.0) -> bool:

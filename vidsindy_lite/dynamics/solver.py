@@ -264,7 +264,7 @@ def _solved(task: _Task, form: Form) -> Solved:
     trajectories, shared, sigma = task.measured
     probes = np.random.default_rng(task.seed)
     problems = views(lambda *how: pose(trajectories, shared, form, probes, sigma, *how))
-    # A first law, and one under process noise.
+    # A first law, and one under process noise or at larger errors.
     rounds = 2 * (1 + ROUNDS) * len(problems)
     with bar(task.progress, "discover", total=rounds, leave=False) as shown_bar:
         history = History(end=task.end, bar=shown_bar)
@@ -282,13 +282,18 @@ def _law(
 ) -> tuple[Problem, Fit, Path]:
     """The law that persists: the problem as that tells it, the last fit, and the path of laws.
 
-    Where it leaves more than the noise, there may be process noise.
+    Where it leaves more than the noise, there may be process noise; where no path leads to a law,
+    errors that last may have made terms of the first, and one that tolerates them is the start.
     """
-    fit, path = persistent(problem, first_law(problem, history), history)
+    fit, path, persists = persistent(problem, first_law(problem, history), history)
     if not (near(problem, fit) or history.over):
         found = _under_process_noise(problem, fit, probes, history)
         if found is not None:
-            return found[0], *persistent(*found, history)
+            return found[0], *persistent(*found, history)[:2]
+    if not (persists or history.over):
+        law = first_law(problem, history, path.level)
+        other, around, leads = persistent(problem, law, history)
+        fit, path = (other, around) if leads else (fit, path)
     return problem, fit, path
 
 

@@ -500,7 +500,7 @@ NOTHING = "nothing"  #: The solver as it is.
 
 def _first_law_alone(problem: Any, fit: Any, history: Any) -> Any:
     fit = path.polish(problem, fit, history)
-    return fit, path.follow(problem, fit)
+    return fit, path.follow(problem, fit), True
 
 
 def _same(problem: Any, *_: Any) -> Any:
