@@ -332,7 +332,8 @@ class Adjustment:
         # In the directions of `half`, A is the unit matrix.
         half = ways[:, told] / np.sqrt(values[told]) / size[:, None]
         measured = half.T @ (self.prior[:, None] * half)
-        return half @ np.linalg.cholesky(tau * np.eye(len(measured)) - (tau - 1) * measured)
+        grown, turned = np.linalg.eigh(tau * np.eye(len(measured)) - (tau - 1) * measured)
+        return half @ turned * np.sqrt(np.maximum(grown, 1.0))  # less, by rounding, is none
 
 
 class _Reduced(NamedTuple):
