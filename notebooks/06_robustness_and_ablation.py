@@ -44,7 +44,6 @@ jobs: int = 2  # trials at a time
 # %%
 from collections import Counter
 from dataclasses import replace
-from itertools import product
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -60,18 +59,14 @@ from vidsindy_lite.study import (
     REFERENCE_OFFSET,
     SYSTEMS,
     FilmTask,
-    FlowContest,
     Trial,
     Weights,
-    ablation_table,
-    ablations,
     add_noise,
     by_condition,
     cramer_rao_bound,
     grid,
     plots,
     rate,
-    run_ablation,
     run_film,
     run_trial,
     run_trials,
@@ -410,25 +405,7 @@ print(f"spline-ADO with up to 50 % in blocks or 20 % in fibers missing: {rate(he
 assert held.mean() >= 0.8 or not full
 
 # %% [markdown]
-# ## Our solver, taken apart
-#
-# The paper takes the core out of its method; so do we, mechanism by mechanism. While a contest of the
-# [scoreboard](11_scoreboard.ipynb) runs, what does the work of one of them is replaced by what does nothing. *Lost* are laws that
-# are exact with it and not without. Errors here are not white: they drift, last, grow, or come from an integrator.
-
-# %%
-errors = ("drift 0.2 %", "bent space 0.3 %", "correlated noise 5 %", "outliers 2 %", "coarse steps", "clock jitter 30 %")
-flows = ("Roessler", "Arneodo", "Halvorsen", "BurkeShaw", "Chen") if full else ("Halvorsen",)
-draws = product(flows, errors, (40, 80)) if full else product(flows, errors[:1], (40,))
-contests = [FlowContest(flow, error, 800, seed=seed + draw) for flow, error, draw in draws]
-tasks = list(ablations(contests))
-apart = ablation_table(sweep(run_ablation, tasks if full else tasks[::8], jobs=jobs, desc="taken apart"))
-
-caption = f"Exact laws of {len(contests)} contests without each mechanism of the solver: five flows, six kinds of error, two draws."
-save_table("table_solver_ablation", apart.reset_index().to_dict("records"), caption=caption, tolerance={"seconds": 1e9})
-
-# %% [markdown]
-# *A mechanism whose row does not differ from the first one does not show in these contests.*
+# Our solver is taken apart in the same way, with errors that are not white, in [notebook 11](11_scoreboard.ipynb#our-solver-taken-apart).
 #
 # ## The second protocol: noise and gaps in the path
 #
@@ -742,7 +719,7 @@ for row in rows:
 #
 # ## Run time and versions
 #
-# All cells take about 70 minutes on two cores.
+# All cells take about 60 minutes on two cores.
 
 # %%
 print(versions())

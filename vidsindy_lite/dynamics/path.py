@@ -39,7 +39,6 @@ from .noise import (
 )
 from .problem import (
     FINAL_WEIGHT,
-    FIRST_WEIGHTS,
     WEIGHTS,
     Problem,
     fit_curves,
@@ -129,7 +128,7 @@ def first_law(problem: Problem, history: History, tolerated: float | None = None
         if k and (rows == stages[k - 1]).all():
             continue
         whole = unpruned(tolerant, rows)
-        history.add("all terms", tolerant, whole, FIRST_WEIGHTS[-1])
+        history.add("all terms", whole)
         fit = cheapest(tolerant, whole, [(problem.origin, np.zeros(problem.d, dtype=bool))])
         for weight in WEIGHTS:
             fit = select(tolerant, fit, weight, "subset search", history)
@@ -152,7 +151,7 @@ def select(problem: Problem, start: Fit, weight: float, stage: str, history: His
         return replace(fit, criterion=problem.criterion(weighted, fit.state))
 
     best = refit(start.state)
-    history.add(stage, problem, best, weight)
+    history.add(stage, best)
     for _ in range(LONGEST_SEARCH):
         state = best.state
         columns = problem.columns(state)
@@ -168,7 +167,7 @@ def select(problem: Problem, start: Fit, weight: float, stage: str, history: His
         if not trial.criterion < best.criterion - NEGLIGIBLE or history.over:
             break
         best = trial
-        history.add(stage, problem, best, weight)
+        history.add(stage, best)
     return best
 
 
@@ -326,7 +325,7 @@ def refit(problem: Problem, path: Path, history: History) -> Fit | None:
     fit = replace(fit, criterion=tolerant.criterion(fit.collocation, fit.state))
     if not np.isfinite(fit.criterion):
         return None
-    history.add("another law of the path", tolerant, fit, FINAL_WEIGHT)
+    history.add("another law of the path", fit)
     fit = framed(tolerant, fit, history)
     return fit if (residual_noise(fit) <= CONSISTENT * tolerant.noise).all() else None
 
@@ -364,7 +363,7 @@ def polish(problem: Problem, fit: Fit, history: History, most: int = 16) -> Fit:
         if error > 1 and fit.status is Status.CONVERGED:
             # A quarter more at once: the errors that the law leaves fall, too.
             parts = min(int(np.ceil(1.25 * parts * error**0.25)), most)
-    history.add("polish", problem, fit, FINAL_WEIGHT)
+    history.add("polish", fit)
     return fit
 
 

@@ -27,7 +27,6 @@ from .data import Trajectory
 from .library import Function, Library, extended, of_pieces
 from .mechanics import NAME, Physics, Quantity, Round, on_circle, physics_of
 from .model import PolynomialSystem, place, with_error
-from .problem import Problem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -119,25 +118,19 @@ class Step:
         What was done.
     seconds : float
         Time since the start.
-    physics_weight : float
-        Relative weight of the physics loss.
     data_loss : float
         Mean square residual of the data over the noise variance.
     physics_loss : float
         Mean square residual of the law in standard units.
     terms : int
         Number of active terms.
-    offset : ndarray, shape (d,)
-        Origin of the law in the data's frame.
     """
 
     stage: str
     seconds: float
-    physics_weight: float
     data_loss: float
     physics_loss: float
     terms: int
-    offset: Floats
 
 
 @dataclass(frozen=True)
@@ -177,19 +170,17 @@ class History:
             self.bar.update()
         return not self.over
 
-    def add(self, stage: str, problem: Problem, fit: Fit, weight: float) -> None:
-        """Add what a fit at a relative physics weight has reached."""
+    def add(self, stage: str, fit: Fit) -> None:
+        """Add what a fit has reached."""
         state, collocation = fit.state, fit.collocation
         data = collocation.data_loss(state.control_points)
         self.steps.append(
             Step(
                 stage=stage,
                 seconds=time.perf_counter() - self.began,
-                physics_weight=weight,
                 data_loss=data / collocation.counts.sum(),
                 physics_loss=float((collocation.physics_residual(state) ** 2).mean()),
                 terms=int(state.active.sum()),
-                offset=problem.units.point(state.offset),
             )
         )
 
@@ -292,6 +283,8 @@ class Discovery:
         if self.orientation is None:
             return ""
         rounded = np.round(self.orientation, 4) + 0.0  # none of them -0
+        if (rounded == np.eye(*rounded.shape)).all():
+            return ""
         rows = (", ".join(f"{part:.4f}" for part in row) for row in rounded)
         pairs = zip(self.system.names, rows, strict=False)
         return "turned, " + ", ".join(f"{name} along ({row})" for name, row in pairs)
@@ -505,7 +498,7 @@ class Discovery:
                 f"not seen, though they may be as large as terms of the law: {frame}"
                 f"{', '.join(terms[:3])}{more}"
             )
-        if self.orientation is not None:
+        if self.axes:
             lines.append(f"axes: {self.axes}; the error bars hold theirs")
         if self.note:
             lines.append(f"note: {self.note}")

@@ -503,6 +503,10 @@ def _first_law_alone(problem: Any, fit: Any, history: Any) -> Any:
     return fit, path.follow(problem, fit), True
 
 
+def _first_start_alone(problem: Any, fit: Any, history: Any) -> Any:
+    return (*path.persistent(problem, fit, history)[:2], True)
+
+
 def _same(problem: Any, *_: Any) -> Any:
     return problem
 
@@ -515,6 +519,7 @@ def _own(problem: Any, fit: Any, *_: Any) -> Any:
 WITHOUT: dict[str, tuple[tuple[Any, str, Any], ...]] = {
     NOTHING: (),
     "support path": ((solver, "persistent", _first_law_alone),),
+    "second start": ((solver, "persistent", _first_start_alone),),
     "first tolerance": tuple((where, "TOLERATED", 0.0) for where in (path, noise)),
     "floor for smooth errors": ((path, "SMOOTH", 0.0),),
     "integrated autocorrelation time": ((noise, "effective_noise", noise.residual_noise),

@@ -62,7 +62,7 @@ _SAME_TARGET = ("shape", "colour", "size", "shape_seed", "turns")  # fields of S
 
 
 @dataclass(frozen=True)
-class Film:
+class Filmed:
     """Three video files of one benchmark, and the truth behind them.
 
     Parameters
@@ -96,7 +96,7 @@ class Film:
 
 def film(
     name: str, folder: str | Path, frames: int = 1500, seed: int = 0, **disturbances: Any
-) -> Film:
+) -> Filmed:
     """Film a benchmark with three cameras against random backgrounds.
 
     Parameters
@@ -114,7 +114,7 @@ def film(
 
     Returns
     -------
-    Film
+    Filmed
 
     Raises
     ------
@@ -136,7 +136,7 @@ def film(
         paths.append(Path(folder) / f"{name}_{number}.mov")
         disturbance_seed = int(disturb.generate_state(1)[0])
         render_video(paths[-1], camera.project(x), scenes[-1], seed=disturbance_seed)
-    return Film(tuple(paths), rig, truth, t, x, tuple(scenes))
+    return Filmed(tuple(paths), rig, truth, t, x, tuple(scenes))
 
 
 @dataclass(frozen=True)
