@@ -204,13 +204,13 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     if order == 1 or task.library.given:
         return found
     if order == "auto" and fit.state.active[1:].any() and len(task.names) == 1:
-        # What only rises or falls on a line passes no place twice, and may be pulled steadily.
-        constant = replace(task, library=Library.polynomial(0))
-        steady, exact, its = _solved(constant, constant.form(2))
+        # What only rises or falls on a line passes no place twice, or hardly: forces may pull it.
+        linear = replace(task, library=Library.polynomial(1))
+        steady, exact, its = _solved(linear, linear.form(2))
         less = information_criterion(problem, fit) - information_criterion(exact, its)
-        if less > STRONG and not exact.has_process_noise:
+        if less > STRONG and its.state.active[0].any() and not exact.has_process_noise:
             return replace(
-                steady, note=f"order 2: a constant force costs {less:.3g} less than order 1"
+                steady, note=f"order 2: forces of degree 1 cost {less:.3g} less than order 1"
             )
     if not found.warnings:
         return found
