@@ -370,7 +370,8 @@ if full:
 #
 # The paper takes the core out of its method; so do we, mechanism by mechanism. While a contest runs, what does the work of one of them
 # is replaced by what does nothing. *Lost* are laws that are exact with it and not without. The contests are the
-# flows above that are not the paper's, with errors that are not white, and the cubic equations of ODEBench with noise and one of ten samples left.
+# flows above that are not the paper's, with errors that are not white, and the cubic equations of ODEBench with noise and one of
+# ten samples left.
 
 # %%
 kinds = ("drift 0.2 %", "bent space 0.3 %", "correlated noise 5 %", "outliers 2 %", "coarse steps", "clock jitter 30 %", "kicks 5 %")

@@ -107,8 +107,8 @@ def first_law(problem: Problem, history: History, tolerated: float | None = None
     """A law at a large tolerated error: of terms of low degree, and of all if these miss something.
 
     The error is relative to the spread of the data, `TOLERATED` by default; where the noise is
-    larger, that is tolerated, and kicks are as they are. Of long data it is the law of a part, if
-    that fits all.
+    larger, that is tolerated, and process noise is as it is. Of long data it is the law of a part,
+    if that fits all.
     """
     least = TOLERATED if tolerated is None else tolerated
     noise = problem.noise if problem.has_process_noise else np.maximum(problem.noise, least)

@@ -205,6 +205,7 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
         return found
     if order == "auto" and fit.state.active[1:].any() and len(task.names) == 1:
         # What only rises or falls on a line passes no place twice, or hardly: forces may pull it.
+        # Linear ones without a constant pull also hold where the law of first order is linear.
         linear = replace(task, library=Library.polynomial(1))
         steady, exact, its = _solved(linear, linear.form(2))
         less = information_criterion(problem, fit) - information_criterion(exact, its)
