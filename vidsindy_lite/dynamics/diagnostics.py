@@ -18,7 +18,7 @@ from scipy.linalg import eigh
 from scipy.special import betaincc, chdtrc, chdtri
 
 from ..arrays import Bools, Floats, Ints
-from .collocation import CLEANEST, Fit, Linearisation, State, Status
+from .collocation import CLEANEST, Fit, Linearisation, State, Status, WithCurve
 from .data import Trajectory, typical_step
 from .frames import closed, free_offsets, laws_at
 from .l0 import RIDGE, STRONG, far_neighbours, newcomers, prior_penalties
@@ -275,7 +275,7 @@ class Wider:
     further: Ints
 
     @cached_property
-    def model(self) -> Linearisation:
+    def model(self) -> WithCurve:
         """The quadratic model around the fit, in all candidates and moving axes."""
         return self.problem.model(self.fit)
 
@@ -669,9 +669,9 @@ def _rivals(
             "may be an approximation along these data, as of a sine or a drag; raise the degree, "
             "or name its terms with library="
         )
+    yield from _far_neighbours(wider, path.tolerated, remedy)
     origins = list(pinned(problem, fit.state, model, law, path.tolerated))
     if not tolerant:  # weaker errors than those tolerated say nothing about the law
-        yield from _far_neighbours(wider, remedy)
         origins += elsewhere(problem.cautious, fit, law)
     yield from untold_origins(origins, remedy)
 
@@ -708,17 +708,17 @@ def _changing(problem: Problem, fit: Fit, tolerated: float, most: int = 8) -> It
         )
 
 
-def _far_neighbours(wider: Wider, remedy: str) -> Iterator[str]:
+def _far_neighbours(wider: Wider, tolerated: float, remedy: str) -> Iterator[str]:
     """Has another law that may as well be true coefficients far from those of this one?
 
-    Unless the evidence against it is strong. The axes stay as they are: the same law in another
+    Unless the evidence against it is strong, at the errors that are tolerated. The axes stay as they are: the same law in another
     frame would count.
     """
     law, columns = wider.problem.law(wider.fit.state), wider.problem.form.searched
     support, present = wider.fit.state.free()[columns], wider.fit.state.flat()[columns]
     if not support.any():
         return
-    model = wider.model.of(columns)
+    model = wider.model.tolerating(tolerated**-2).of(columns)
     penalties = np.tile(prior_penalties(law.exponents), law.d)[columns]
     odds, dropped, added, entry, value = far_neighbours(
         model.information, model.gradient, present, penalties, support
