@@ -284,7 +284,7 @@ def test_a_table_of_the_track_and_the_frames_that_count(tmp_path, capsys):
     again = json.loads((law / "result.json").read_text("utf-8"))
     assert again["g"] == pytest.approx(data["g"], rel=1e-6)
     capsys.readouterr()
-    for frames in ("125,9", "25,58", "125,1000", "124.5,157"):
+    for frames in ("125,9", "25,58", "125,1000", "124.5,157", "125,129"):
         assert main([*command, "--frames", frames]) == 2
         assert "frames: must be the first and the last that count" in capsys.readouterr().err
     for wrong in ({"hint": vl.Hint(frame=3, box=(1, 1, 9, 9))}, {"detector": "learned"}):

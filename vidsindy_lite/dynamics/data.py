@@ -87,12 +87,10 @@ def check_trajectories(
         is left out only if nothing was seen in it.
     """
     pairs = t if x is None else [(t, x)]
-    if not isinstance(pairs, list | tuple) or not all(
-        isinstance(pair, list | tuple) and len(pair) == 2 for pair in pairs
-    ):
-        raise ValueError(
-            f"x: must be given, unless t is a list of pairs (t, x), got t = {shown(t)}"
-        )
+    items = pairs if isinstance(pairs, list | tuple) else [pairs]
+    other = [pair for pair in items if not (isinstance(pair, list | tuple) and len(pair) == 2)]
+    if other:
+        raise ValueError(f"t: must be a list of pairs (t, x), or x be given, got {shown(other[0])}")
     trajectories = []
     for i, pair in enumerate(pairs):
         try:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -658,7 +659,8 @@ def _rivals(
     if clean and not problem.has_process_noise:
         return  # what is left is the error of the splines, not noise: it settles nothing
     yield from _changing(problem, fit, path.tolerated)
-    tolerant = clean or max(p.low for p in path.of(fit.state.active)) > path.lowest
+    begins = max(plateau.low for plateau in path.of(fit.state.active))
+    tolerant = clean or begins > path.lowest
     found = wider.beyond
     # Errors that last may follow the state, too; they are no reason to doubt, unless a single term,
     # or the few that a single coordinate has, explain nearly all of them.
@@ -669,7 +671,10 @@ def _rivals(
             "may be an approximation along these data, as of a sine or a drag; raise the degree, "
             "or name its terms with library="
         )
-    yield from _far_neighbours(wider, path.tolerated, remedy)
+    # From where the law begins to what is tolerated, each decade as likely.
+    least = max(begins / path.own, 1.0)
+    sizes = np.geomspace(least, max(least, path.tolerated), 5)
+    yield from _far_neighbours(wider, sizes, remedy)
     origins = list(pinned(problem, fit.state, model, law, path.tolerated))
     if not tolerant:  # weaker errors than those tolerated say nothing about the law
         origins += elsewhere(problem.cautious, fit, law)
@@ -708,21 +713,21 @@ def _changing(problem: Problem, fit: Fit, tolerated: float, most: int = 8) -> It
         )
 
 
-def _far_neighbours(wider: Wider, tolerated: float, remedy: str) -> Iterator[str]:
+def _far_neighbours(wider: Wider, tolerated: Floats, remedy: str) -> Iterator[str]:
     """Has another law that may as well be true coefficients far from those of this one?
 
-    Unless the evidence against it is strong, at the errors that are tolerated. The axes stay as they are: the same law in another
-    frame would count.
+    Unless the evidence against it is strong, on average over the errors that may have to be
+    ``tolerated``, (k,). The axes stay as they are: the same law in another frame would count.
     """
     law, columns = wider.problem.law(wider.fit.state), wider.problem.form.searched
     support, present = wider.fit.state.free()[columns], wider.fit.state.flat()[columns]
     if not support.any():
         return
-    model = wider.model.tolerating(tolerated**-2).of(columns)
     penalties = np.tile(prior_penalties(law.exponents), law.d)[columns]
-    odds, dropped, added, entry, value = far_neighbours(
-        model.information, model.gradient, present, penalties, support
-    )
+    models = [wider.model.tolerating(error**-2).of(columns) for error in tolerated]
+    found = [far_neighbours(m.information, m.gradient, present, penalties, support) for m in models]
+    odds = sum(one[0] for one in found) / len(found)
+    _, dropped, added, entry, value = max(found, key=itemgetter(0))
     if odds > np.exp(-STRONG / 2):
         out, into = (place(law, columns[k]) if k >= 0 else "" for k in (dropped, added))
         change = f"{into} instead of {out}" if out and into else f"with {into}" if into else ""
