@@ -203,7 +203,7 @@ def test_missing_and_masked_rows_are_left_out():
         assert (x == X[:4]).all()
 
 
-@pytest.mark.parametrize("t", [[1, 2], T, (T, X), [(T, X), (T,)], None, [], [(T, X), (T, X[:, :1])]])
+@pytest.mark.parametrize("t", [[1, 2], T, [(T, X), (T,)], None, [], [(T, X), (T, X[:, :1])]])
 def test_what_is_no_list_of_trajectories_of_one_system(t):
     given = r"t: must be a list of pairs \(t, x\), or x be given"
     with pytest.raises(ValueError, match=f"{given}|t: a list of trajectories must hold at least"):
