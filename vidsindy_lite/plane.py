@@ -181,7 +181,8 @@ def discover_from_video(
     marks, places, measured = four_places(length, up, corners, size, within=not table)
     to_plane = homography_of(marks, places)
     error = float(np.hypot(share, np.sqrt(2) * MARK / measured)) if measured else 0.0
-    unit, scale = ("m", f", their scale known to {100 * error:.2g} %") if measured else ("px", "")
+    unit = "m" if measured else "px"
+    scale = f", their scale known to {100 * error:.2g} % at the marks" if measured else ""
     middle, centre = marks.mean(axis=0), (np.array(size) - 1) / 2
     across = complex(*np.diff(mapped(to_plane, middle + [[0.0, 0], [1, 0]]), axis=0)[0])
     camera = PlaneCamera(
