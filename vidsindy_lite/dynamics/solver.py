@@ -24,7 +24,7 @@ from ..arrays import Floats
 from ..checks import check_choice, check_integer, check_positive, shown
 from ..progress import bar
 from .bspline import DEGREE
-from .collocation import Fit
+from .collocation import Fit, Status
 from .data import Trajectory, check_sigma, check_systematic, check_trajectories, coordinate_names
 from .diagnostics import diagnose, is_on_circle
 from .inference import infer, with_errors
@@ -32,7 +32,7 @@ from .l0 import STRONG
 from .library import Library, check_library, monomial_exponents, monomials
 from .mechanics import NAME
 from .model import Form
-from .noise import bent, rebalanced, smoother_weights, views, with_process_noise
+from .noise import TOLERATED, bent, rebalanced, smoother_weights, views, with_process_noise
 from .orientation import Measured, Solved, check_orientation, in_axes, in_sparsest_axes, with_turns
 from .path import ROUNDS, first_law, information_criterion, near, persistent
 from .problem import Problem, pose
@@ -271,7 +271,9 @@ def _solved(task: _Task, form: Form) -> Solved:
         history = History(end=task.end, bar=shown_bar)
         laws = [_law(problem, probes, history) for problem in problems]
         shown_bar.update(rounds - shown_bar.n)
-    problem, fit, path = min(laws, key=lambda law: information_criterion(*law[:2]))
+    # What has not converged is no law, however little it leaves.
+    met = [law for law in laws if law[1].status is Status.CONVERGED]
+    problem, fit, path = min(met or laws, key=lambda law: information_criterion(*law[:2]))
     model = path.model if path.fit is fit else problem.model(fit)
     found = infer(problem, fit, model, path, history)
     doubts = diagnose(problem, fit, model, path, found.system)
@@ -291,7 +293,8 @@ def _law(
         found = _under_process_noise(problem, fit, probes, history)
         if found is not None:
             return found[0], *persistent(*found, history)[:2]
-    if not (persists or history.over):
+    more = path.level > np.maximum(problem.noise, TOLERATED)
+    if more.any() and not (persists or history.over):
         law = first_law(problem, history, path.level)
         other, around, leads = persistent(problem, law, history)
         fit, path = (other, around) if leads else (fit, path)
