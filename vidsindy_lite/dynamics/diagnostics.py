@@ -23,12 +23,7 @@ from .collocation import CLEANEST, Fit, Linearisation, State, Status, WithCurve
 from .data import Trajectory, typical_step
 from .frames import closed, free_offsets, laws_at
 from .l0 import RIDGE, STRONG, far_neighbours, newcomers, prior_penalties
-from .library import (
-    monomial_exponents,
-    monomials,
-    shift_generators,
-    shift_matrix,
-)
+from .library import monomial_exponents, monomials, shift_generators, shift_matrix
 from .mechanics import FAINT, Round, on_circle, on_sphere
 from .model import PolynomialSystem, place, spoken
 from .noise import CONSISTENT, GROSS, effective_noise, passing, residual_noise
