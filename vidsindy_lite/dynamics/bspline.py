@@ -28,7 +28,6 @@ from ..arrays import Floats, Ints
 
 DEGREE = 3
 WIDTH = DEGREE + 1  #: Control points that a point of the curve depends on.
-BESIDE = 1e-3  #: Distance of a node from a kink, in knot spans: more than rounding moves a time.
 
 
 def clamped_knots(breakpoints: Floats) -> Floats:
@@ -243,8 +242,9 @@ class Grid:
 def _nodes(b: Floats, kinks: Floats) -> tuple[Floats, Floats]:
     """Collocation nodes of a piece between its breakpoints, and how much of it each stands for."""
     spans = np.diff(b)
-    # The law jumps at a kink: on this side of it, what holds is asked just beside it.
-    low, high = np.isin(b[[0, -1]], kinks) * BESIDE * spans[[0, -1]]
+    # The law jumps at a kink: on this side of it, what holds is asked a thousandth of a span beside
+    # it, more than rounding moves a time.
+    low, high = np.isin(b[[0, -1]], kinks) * 1e-3 * spans[[0, -1]]
     nodes = np.concatenate([b[:1] + low, (b[1:] + b[:-1]) / 2, b[-1:] - high])
     return nodes, np.concatenate([spans[:1] / 2, spans, spans[-1:] / 2])
 

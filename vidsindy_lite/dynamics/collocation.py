@@ -26,9 +26,6 @@ from .library import Function, law_terms, linearised
 
 #: Least noise, relative to the spread of the data, that the splines are trusted to resolve.
 CLEANEST = 1e-5
-#: What rounding does to a banded factor, relative to its largest entry: less could leave it without
-#: a root, more would hold the curve back.
-ROUNDING = 1e-14
 
 
 @dataclass(frozen=True)
@@ -394,7 +391,9 @@ class Collocation:
     def _factor(self, physics: sparse.csr_array, damping: float = 0.0) -> Floats:
         """Cholesky factor of the normal matrix of the control points, in lower banded storage."""
         band = self._data_band + normal_band(physics, alike=self.d)
-        band[0] += damping * band[0] + ROUNDING * band[0].max()
+        # What rounding does to a factor: less could leave it without a root, more would hold the
+        # curve back.
+        band[0] += damping * band[0] + 1e-14 * band[0].max()
         return cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
 
     def factor(self, state: State) -> tuple[Floats, sparse.csr_array]:

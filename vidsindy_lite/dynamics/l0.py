@@ -19,7 +19,6 @@ COLLINEAR = 1e-9
 NEGLIGIBLE = 1e-6  #: Changes of the function below this are taken for rounding.
 #: Twice the log of odds of 20 to 1: strong evidence for one of two laws (Kass, Raftery 1995).
 STRONG = 6.0
-FAR = 4.0  #: Standard errors of a coefficient beyond which another law has another coefficient.
 LEAST = 1e-300  #: Keeps a quotient or a logarithm finite where there is nothing.
 #: Keeps a matrix with dependent columns solvable; what it cannot tell gets a huge variance.
 RIDGE = 1e-12
@@ -342,8 +341,8 @@ def far_neighbours(
     Returns
     -------
     odds : float
-        Probability of all that have an entry more than `FAR` errors away, if the law is the support
-        or one of its neighbours.
+        Probability of all that have an entry more than four standard errors away, if the law is the
+        support or one of its neighbours.
     dropped, added : int
         The entries that the likeliest of them drops and adds; -1 if it drops or adds none.
     entry : int
@@ -368,7 +367,7 @@ def far_neighbours(
     cost, values, out, into = (np.concatenate(parts) for parts in zip(*found, strict=True))
     apart = np.abs(values - law.fitted) / np.sqrt(law.spread)
     weight = np.exp((cost.min() - cost) / 2)
-    weight = np.where((apart > FAR).any(axis=1), weight / weight.sum(), 0.0)
+    weight = np.where((apart > 4).any(axis=1), weight / weight.sum(), 0.0)
     best = int(weight.argmax())
     farthest = int(apart[best].argmax())
     entry = int(law.inside[farthest])

@@ -33,8 +33,6 @@ IMITATED = "if its powers imitate no other force, as cubics do a sine"
 
 NAME = "angle"  #: Of the coordinate of what moves on a circle.
 
-Complexes = NDArray[np.complex128]
-
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
@@ -389,7 +387,7 @@ class _Body:
         return found
 
 
-def _swings(stiffness: Floats, damping: Floats, alone: bool) -> Complexes:
+def _swings(stiffness: Floats, damping: Floats, alone: bool) -> NDArray[np.complex128]:
     """Decay and rotation of each coordinate, if it is alone, or of each mode, as complex rates."""
     m = len(stiffness)
     if alone:

@@ -29,8 +29,6 @@ from .model import Form
 from .problem import Problem, leaves_something_over, tightened, unpruned
 from .result import Discovery
 
-ALIKE = np.deg2rad(2.0)  #: Orientations that differ by less are one.
-
 Solved = tuple[Discovery, Problem, Fit]
 #: Trajectories, their systematic errors, and their standard errors if they are known.
 Measured = tuple[list[Trajectory], list[Floats], list[Floats] | None]
@@ -119,7 +117,8 @@ def rough_orientations(problem: Problem, rng: np.random.Generator, most: int = 3
         limit = len(found) + most
         for _, turn, _ in sorted(fine, key=itemgetter(0)):
             near = nearest(turn)
-            if len(found) < limit and all(apart(near, other) > ALIKE for other in found):
+            # Orientations that differ by less than two degrees are one.
+            if len(found) < limit and all(apart(near, one) > np.deg2rad(2) for one in found):
                 found.append(near)
         if not leaves_something_over(problem, fit):
             break

@@ -30,8 +30,6 @@ FALSE_ALARM = 0.02
 #: The same where samples share errors, which look like evidence for small terms, and elsewhere for
 #: a law that is not to be doubted: a term that is only worth the penalty above is told.
 SURE = 0.004
-#: Penalty of a free axis, in constant terms: of two laws alike, the one with fewer terms wins.
-OFFSET_PENALTY = 0.95
 #: Samples a turn from which on a curve tells the noise to a tenth, and kicks from a drive.
 COARSE = 20
 
@@ -172,8 +170,11 @@ class Problem:
 
     @property
     def axis_penalty(self) -> float:
-        """Penalty of an axis along which the law's origin is not that of the data."""
-        return float(OFFSET_PENALTY * self.penalties[0])
+        """Penalty of an axis along which the law's origin is not that of the data.
+
+        Less than that of a constant term: of two laws alike, the one with fewer terms wins.
+        """
+        return float(0.95 * self.penalties[0])
 
     @property
     def counts(self) -> Ints:
@@ -328,9 +329,8 @@ def spread_to_unseen(noise: Floats, seen: Bools) -> Floats:
 # --------------------------------------------------------------------------------------------------
 # Penalty continuation: fits while the physics weight rises.
 
-#: Physics weights of a fit of all terms, relative to the misfit of a plain regression.
-FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
-WEIGHTS = (1e2, 1e4, 1e8)  #: Physics weights of a search.
+#: Physics weights of a search, relative to the misfit of a plain regression.
+WEIGHTS = (1e2, 1e4, 1e8)
 FINAL_WEIGHT = WEIGHTS[-1]  #: Weight at which the law holds exactly for all that the data can tell.
 
 
@@ -350,7 +350,7 @@ def unpruned(problem: Problem, rows: Bools) -> Fit:
     coefficients[~active] = 0.0
     still, shared = np.zeros(problem.d, dtype=bool), problem.form.shared
     state = State(control, coefficients, active, np.zeros(problem.d), still, shared)
-    for weight in FIRST_WEIGHTS:
+    for weight in (1e-1, 1e0, 1e1, 1e2):
         fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
         if fit.status is not Status.CONVERGED:
             break
@@ -467,8 +467,6 @@ def _telling(form: Form, seen: Bools, u: int) -> tuple[int, int]:
 
 # --------------------------------------------------------------------------------------------------
 # Poses the problem of a discovery: standard units, gaps, the noise, and the library's units.
-
-GAP = 0.4  #: A pause longer than this fraction of the time scale of the motion is a gap.
 
 
 def pose(
@@ -670,7 +668,8 @@ def _smoothed(
     steps = typical_steps(trajectories)
     first = _stretches(trajectories, 5.0 * steps, unsure)
     smoothed = smooth([piece for _, piece in first], rng, penalties)
-    longest = np.maximum(2.5 * steps, GAP / _rms_speed(smoothed.splines))
+    # Of the time scale of the motion, above which a pause is a gap.
+    longest = np.maximum(2.5 * steps, 0.4 / _rms_speed(smoothed.splines))
     stretches = _stretches(trajectories, longest, unsure)
     if [len(t) for _, (t, _) in stretches] != [len(t) for _, (t, _) in first]:
         smoothed = smooth([piece for _, piece in stretches], rng, penalties)
