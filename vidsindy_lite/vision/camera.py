@@ -38,11 +38,8 @@ _STEP = 8.0  # pixels by which the guess may be wrong
 PARTS = 12  # into which each side of an image is cut: of one corner, and of one error, each
 LOOSE = 1.0  # pixels (reduced ones if it is to be used at all) to which a camera's motion is known
 _STILL = 0.25  # reduced pixels by which a corner at rest may seem to move
-_VAGUE = 3.0  # reduced pixels: a map that is known no better is not known
-_PLAINLY = 10.0  # standard errors of a displacement that is one
 _MANY = 60  # corners that need no other witness
 _CHANCE = 0.04  # gain (see `_gain`) above which it tells: those of mere noise are a tenth of it
-_AGREE = 0.25  # share of the corners that must do so: of those of mere noise, 0.15 to 0.24 agree
 
 
 class Aligned(NamedTuple):
@@ -294,7 +291,8 @@ def _moved(before: Look, after: Look) -> bool | None:
         np.sum(np.linalg.norm(carry(here, a) - b, axis=1) < _STILL) for here in (rest, found.map)
     )
     moved = displacement(found.map[None], before.grey.shape[::-1])[0]
-    return bool(moved > max(_PLAINLY * found.error, _STILL) and stay <= 0.7 * share)
+    # Ten standard errors of a displacement are one.
+    return bool(moved > max(10 * found.error, _STILL) and stay <= 0.7 * share)
 
 
 def displacement(maps: Floats, size: Sequence[int]) -> Floats:
@@ -313,7 +311,8 @@ def _by_corners(before: Look, after: Look, last: Floats) -> tuple[Aligned | None
     if len(a) < 20:  # fewer are not worth a look
         return None, False
     found, obey = cv2.estimateAffinePartial2D(a, b, ransacReprojThreshold=2 * LOOSE)
-    if found is None or obey.sum() < max(20, _AGREE * len(a)):
+    # Of the corners of mere noise, a share of 0.15 to 0.24 agree.
+    if found is None or obey.sum() < max(20, 0.25 * len(a)):
         return None, False
     best, good = np.vstack([found, [0, 0, 1]]), obey[:, 0] > 0
     if good.sum() >= _MANY:
@@ -342,7 +341,8 @@ class _Key(NamedTuple):
         if alone:
             return told
         direct = align(self.look, look, last)
-        both = [one for one in (told, direct) if one is not None and one.error < _VAGUE]
+        # A map that is known to three reduced pixels, no better, is not known.
+        both = [one for one in (told, direct) if one is not None and one.error < 3.0]
         best = min((one.error for one in both), default=0.0)
         # Times the error of another map that is about as good; then the smaller step is taken.
         good = [one for one in both if one.error <= 3.0 * best]

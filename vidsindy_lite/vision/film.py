@@ -46,9 +46,7 @@ from .plate import Plate, carry, lights_of, noise_of, sampled
 from .refining import Lens, View, entire, fitting, roughness, swapped
 from .video import Reel, reduce
 
-_LONGEST = 480  # pixels of the longer side of a reduced frame
 _SHORTEST = 5  # frames of a path
-_LOUD = 12.0  # grey levels of noise, in more of which no pixel is told alone
 _LOOKS_ALONE = "no view tells it from its ground: it is followed by its looks alone"
 
 
@@ -110,7 +108,7 @@ class Film(NamedTuple):
     @classmethod
     def of(cls, path: str | os.PathLike, *, rests: bool = False) -> Self:
         """From its sampled frames, and from all of them if its camera may move."""
-        frames = Reel(path, _LONGEST)
+        frames = Reel(path, 480)  # pixels of the longer side of a reduced frame
         numbers, samples = sampled(frames)
         small = np.array([reduce(sample, frames.factor) for sample in samples])
         doubts: tuple[str, ...] = ()
@@ -210,7 +208,7 @@ def sighted(
     """What may be the target in each frame, and how bright the frame is."""
     plate, noise = film.ground(boxes)
     frames: Iterable[Image] = film.frames
-    if noise > _LOUD:
+    if noise > 12:  # grey levels, in which no pixel is told alone
         frames = (np.asarray(cv2.GaussianBlur(frame, (0, 0), 1.0), np.uint8) for frame in frames)
         noise /= 2 * np.sqrt(np.pi)
     return candidates(frames, film.maps, plate, noise, targets)

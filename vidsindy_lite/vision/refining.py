@@ -33,10 +33,8 @@ from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .plate import Plate, dot, least_difference, lengths, relit, shadowed, tolerance
 
 _UNEVEN = 0.12  # share by which a shadow may darken the colours of a pixel unlike each other
-_WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
 _AROUND = 9  # views around one that say how large it should be
 _MOSTLY = 0.8  # share of the views that must show it whole
-_JOINED = 2.0  # factor by which the area of something else differs
 _BESIDE = 5  # views before and after a change of size, which show how large it was and is
 _CORE = np.ones((5, 5), np.uint8)  # a rim of two pixels
 
@@ -197,7 +195,8 @@ def entire(views: Sequence[View | None]) -> tuple[list[View | None], tuple[str, 
     if not turns or np.median(areas[:, 0] / areas[:, 1]) > 0.9:
         return parts, ()
     size = np.log(areas[:, 1])
-    keeps = np.abs(size - median_filter(size, _AROUND)) < np.log(_WHOLE)
+    # Whole views differ from those around them by this factor at most.
+    keeps = np.abs(size - median_filter(size, _AROUND)) < np.log(1.5)
     if keeps.mean() > _MOSTLY:
         return [one and (one.whole or one) for one in views], ()
     return parts, ("the target has several colours, or touches other things: perhaps only a part "
@@ -291,7 +290,7 @@ def swapped(frames: Ints, areas: Floats) -> int | None:
 
     No target changes like that within a few frames and remains so.
     """
-    logs = np.log2(np.maximum(areas, 1e-3)) / np.log2(_JOINED)
+    logs = np.log2(np.maximum(areas, 1e-3))  # something else has twice the area, or half of it
     most = np.maximum(np.diff(frames) / _AROUND, 1)
     for first in 1 + np.flatnonzero(np.abs(np.diff(logs)) > most):
         before, after = logs[:first][-_BESIDE:], logs[first:][:_BESIDE]

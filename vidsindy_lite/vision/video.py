@@ -40,8 +40,6 @@ if TYPE_CHECKING:
     from av.container import InputContainer, OutputContainer
     from av.video.stream import VideoStream
 
-SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".ppm", ".pgm"})
-
 
 def timing(shown: Sequence[int | None], stream: VideoStream) -> tuple[Floats, float]:
     """When each frame is `shown`, in ticks, as frames; and the number of frames in a second."""
@@ -191,7 +189,8 @@ def find_stills(path: Path) -> Stills | None:
     if path.is_file() or not (path.is_dir() or re.search(r"[*?]|%\d*d", path.name)):
         return None
     if path.is_dir():
-        files = [file for file in path.glob("[!.]*") if file.suffix.lower() in SUFFIXES]
+        suffixes = ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".ppm", ".pgm"
+        files = [file for file in path.glob("[!.]*") if file.suffix.lower() in suffixes]
         if not files:
             raise ValueError(
                 f"path: must be a video file, or a folder of images, got '{path}' without any"
