@@ -58,7 +58,8 @@ def subset_search(
         The function with penalties.
     """
     model = _Quadratic.of(information, gradient, present, penalty)
-    best = _search(model, start)
+    starts = (start, np.isneginf(model.penalty))
+    best = min((_descend(model, first) for first in starts), key=model.value)
     return best.support, model.solution(best), model.value(best)
 
 
@@ -197,12 +198,6 @@ class _Quadratic:
         solution = np.zeros(len(self.scale))
         solution[fit.inside] = fit.fitted * self.scale[fit.inside]
         return solution
-
-
-def _search(model: _Quadratic, start: Bools) -> _Fit:
-    """The lowest value from a support and from nothing."""
-    starts = (start, np.isneginf(model.penalty))
-    return min((_descend(model, first) for first in starts), key=model.value)
 
 
 def _descend(model: _Quadratic, start: Bools) -> _Fit:
