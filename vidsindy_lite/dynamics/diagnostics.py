@@ -504,9 +504,7 @@ def _met(problem: Problem, fit: Fit) -> list[Bools]:
     return found
 
 
-def outliers(
-    trajectories: Sequence[Trajectory], met: Sequence[Bools], limit: float = 30.0
-) -> list[str]:
+def outliers(trajectories: Sequence[Trajectory], met: Sequence[Bools]) -> list[str]:
     """Samples so far from those around them that they must be errors.
 
     Parameters
@@ -515,12 +513,11 @@ def outliers(
         The data in the user's units.
     met : sequence of ndarray of bool, shape (n,)
         Which samples of each a law passes through: what it explains is no error.
-    limit : float
-        Distance of a sample from those around it, over how far nine samples in ten are from the
-        median, and over the typical distance of those around it, that no motion explains. Noise of
-        50 % makes 6.
     """
-    found = []
+    # Distance of a sample from those around it, over how far nine samples in ten are from the
+    # median, and over the typical distance of those around it, that no motion explains. Noise of
+    # 50 % makes 6.
+    found, limit = [], 30.0
     for (t, x), explained in zip(trajectories, met, strict=True):
         far = np.zeros(len(t), dtype=bool)
         for column in x.T[np.isfinite(x).any(axis=0)]:

@@ -123,7 +123,6 @@ def integrate(
     rate: Callable[[Floats], Floats],
     t: Floats,
     x0: Floats,
-    tolerance: float = 1e-11,
     farthest: float = np.inf,
     most_steps: float = 50_000,
 ) -> tuple[Floats, str]:
@@ -137,8 +136,6 @@ def integrate(
         Increasing times of the returned rows; a step ends at each.
     x0 : ndarray, shape (d,)
         State at ``t[0]``.
-    tolerance : float
-        Error of a step, absolute and relative.
     farthest : float
         Largest coordinate; beyond it the motion is taken to blow up.
     most_steps : float
@@ -169,7 +166,7 @@ def integrate(
                 return path, "is too stiff to be followed"
             taken = end - now if last else step
             with np.errstate(over="ignore", invalid="ignore"):  # of steps that are too long
-                moved, error = _step(rate, x, taken, tolerance)
+                moved, error = _step(rate, x, taken)
             if not error < 1:
                 step = taken / 2
                 if step < 1e-13 * span:
@@ -186,15 +183,13 @@ def integrate(
     return path, ""
 
 
-def _step(
-    rate: Callable[[Floats], Floats], x: Floats, step: float, tolerance: float
-) -> tuple[Floats, float]:
-    """A step of order 8, and its error over the tolerance."""
+def _step(rate: Callable[[Floats], Floats], x: Floats, step: float) -> tuple[Floats, float]:
+    """A step of order 8, and its error over a tolerance of 1e-11, absolute and relative."""
     slopes = np.empty((len(STAGES), len(x)))
     for k, weights in enumerate(STAGES):
         slopes[k] = rate(x + step * np.add.reduce(weights * slopes[:k]))
     moved = x + step * np.add.reduce(WEIGHTS * slopes)
-    scale = tolerance * (1 + np.maximum(np.abs(x), np.abs(moved)))
+    scale = 1e-11 * (1 + np.maximum(np.abs(x), np.abs(moved)))
     third, fifth = (
         float(np.add.reduce((np.add.reduce(weights * slopes) / scale) ** 2))
         for weights in (THIRD, FIFTH)

@@ -354,24 +354,20 @@ def _on_knots(collocation: Collocation, fit: Fit) -> State:
 
 
 def _balanced(
-    problem: Problem,
-    collocation: Collocation,
-    state: State,
-    rng: np.random.Generator,
-    updates: int = 20,
+    problem: Problem, collocation: Collocation, state: State, rng: np.random.Generator
 ) -> Fit:
     """The fit at the variances of noise and kicks that make the data most likely.
 
     Each is the sum of the squares of its residuals, over how many of these the curve and the terms
-    have not used up (MacKay's update). Noise that is given stays. At most so many ``updates``,
-    until no logarithm changes by more than a tenth.
+    have not used up (MacKay's update). Noise that is given stays. At most 20 updates, until no
+    logarithm changes by more than a tenth.
     """
     free, told = _free(problem), problem.measured_errors
     grid, d = collocation.grid, collocation.d
     probes = rng.choice([-1.0, 1.0], (grid.r * d, PROBES))
     hardest = FINAL_WEIGHT * collocation.physics_weights
     unfitted = len(grid.node_weights) - state.active.sum(axis=0)
-    for _ in range(updates):
+    for _ in range(20):
         fit = collocation.solve(state, tolerance=1.0, max_steps=10)
         state, collocation = fit.state, fit.collocation
         factor, physics = collocation.factor(state)

@@ -262,20 +262,18 @@ def has_terms(fit: Fit, goal: Sequence[Plateau]) -> bool:
     return all((p.terms == fit.state.active[:, p.equation]).all() for p in goal)
 
 
-def deepest(
-    problem: Problem, path: Path, history: History, most: int = 6, descent: float = 3.0
-) -> Path:
+def deepest(problem: Problem, path: Path, history: History) -> Path:
     """The path around the last of the richer laws that explain what the one before left over.
 
     A missing term leaves smooth errors, too, and only its own law tells: so the error that is
-    tolerated is lowered as long as that pays (`_explains`). At ``most`` so many laws, the error
-    that is tolerated falling by ``descent`` from one to the next.
+    tolerated is lowered as long as that pays (`_explains`), to a third from one law to the next, of
+    which there are six at most.
     """
-    for _ in range(most):
+    for _ in range(6):
         errors = errors_left(problem, path.fit)
         if near(problem, path.fit) or history.over:
             break
-        tolerant = replace(problem, noise=np.maximum(problem.noise, errors / descent))
+        tolerant = replace(problem, noise=np.maximum(problem.noise, errors / 3))
         weighted = replace(path.fit.collocation, data_weights=tolerant.noise**-2)
         start = replace(path.fit, collocation=weighted)
         fit = select(tolerant, start, FINAL_WEIGHT, "a smaller error", history)
