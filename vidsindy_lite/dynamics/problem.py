@@ -126,11 +126,6 @@ class Problem:
         return np.tile(self.penalties, self.d)
 
     @property
-    def shared(self) -> bool:
-        """Whether there are errors that all samples share, and that do not average out."""
-        return self.pulls.size > 0
-
-    @property
     def cautious(self) -> Problem:
         """The same at the penalties of `SURE`, at which a law is compared with its rivals."""
         equations = self.measured[0][1].shape[1]
@@ -565,7 +560,7 @@ def pose(
         unsure=unsure * speed,
         measured_errors=sigma is not None,
     )
-    if problem.shared:
+    if grown.size:  # there are errors that all samples share, and that do not average out
         problem = problem.cautious
     if form.exponents.shape[1] > len(form.names):
         problem = _with_functions(problem, rng)
