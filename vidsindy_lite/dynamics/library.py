@@ -219,14 +219,9 @@ def shift_generators(exponents: Ints) -> Floats:
 
     ``-N_i`` is the rate of change of `shift_matrix` with the offset along axis i.
     """
-    d = exponents.shape[1]
     lowered = exponents[None, :, :] - exponents[:, None, :]
-    return np.stack(
-        [
-            np.where((lowered == axis).all(axis=-1), exponents[None, :, i], 0.0)
-            for i, axis in enumerate(np.eye(d, dtype=int))
-        ]
-    )
+    axes = np.eye(exponents.shape[1], dtype=int)[:, None, None]
+    return np.where((lowered == axes).all(axis=-1), exponents.T[:, None], 0.0)
 
 
 def linearised(
