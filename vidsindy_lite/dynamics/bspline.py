@@ -254,9 +254,8 @@ def basis(
 ) -> sparse.csr_array:
     """Basis functions of all segments at the given times of each, shape (times, r)."""
     parts = [local_basis(k, t, order) for k, t in zip(knots, times, strict=True)]
-    first = np.concatenate(
-        [first + start for (first, _), start in zip(parts, starts[:-1], strict=True)]
-    )
+    pairs = zip(parts, starts[:-1], strict=True)
+    first = np.concatenate([first + start for (first, _), start in pairs])
     return rows_from(first, np.concatenate([values for _, values in parts]), int(starts[-1]))
 
 
@@ -348,10 +347,9 @@ def smooth(
     patterns, kind = np.unique(np.isfinite(grid.x), axis=1, return_inverse=True)
     for k, seen in enumerate(patterns.T):
         alike, rows = np.flatnonzero(kind == k), np.flatnonzero(seen)
-        smoothed = _cross_validated(
+        control[:, alike], noise[alike] = _cross_validated(
             grid.samples[rows], grid.x[np.ix_(rows, alike)], roughness, signs[rows], penalties
         )
-        control[:, alike], noise[alike] = smoothed
     return Smooth(tuple(grid.splines(control)), noise)
 
 

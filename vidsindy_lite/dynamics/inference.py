@@ -138,12 +138,10 @@ def _in_both_frames(
     """The law in the frame of the data, and the errors in both, as a `Discovery` has them."""
     covariance, size = _covariance(problem.units, fit, model), fit.state.coefficients.size
     coefficients = fit.state.coefficients * problem.units.factors(problem.exponents)
-    moved, moved_covariance = _pruned(
-        problem.exponents, coefficients, offset, covariance, penalties
-    )
+    moved, spread = _pruned(problem.exponents, coefficients, offset, covariance, penalties)
     return {
         "system": problem.form.law(moved + problem.form.known),
-        "covariance": moved_covariance,
+        "covariance": spread,
         "native_covariance": covariance[:size, :size],
         "offset_errors": np.sqrt(np.diag(covariance)[size:]),
     }

@@ -366,8 +366,6 @@ def jumps(value: Callable[[Floats], Floats], t: Floats, halvings: int = 30) -> F
 # own. For given variables it becomes functions of the state, and the exponents of products of
 # coordinates and functions.
 
-OTHERS = "..."  #: All terms of an equation that are not named.
-
 
 @dataclass(frozen=True)
 class Library:
@@ -520,8 +518,7 @@ class Library:
         >>> vl.Library.polynomial(2).where(known | forbidden)
         """
         rows = {name: dict(terms) for name, terms in self.given}
-        example = "{'x': {'y': 10, 'z': 0}}"
-        rule = f"give variables what is known of their terms, e.g. {example}"
+        rule = "give variables what is known of their terms, e.g. {'x': {'y': 10, 'z': 0}}"
         check_mapping("equations", equations, rule, Mapping)
         for name, terms in equations.items():
             checked = {
@@ -581,9 +578,8 @@ class Library:
             max(self.denominators, other.denominators),
             tuple(functions.items()),
         )
-        given = [(name, dict(terms)) for name, terms in self.given + other.given]
-        for name, terms in given:
-            total = total.where({name: terms})
+        for name, terms in self.given + other.given:
+            total = total.where({name: dict(terms)})
         return total
 
     def __str__(self) -> str:

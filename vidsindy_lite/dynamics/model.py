@@ -28,7 +28,6 @@ from ..checks import (
 )
 from .library import (
     CLOCK,
-    OTHERS,
     Function,
     Library,
     check_mapping,
@@ -311,8 +310,7 @@ class PolynomialSystem:
             If the equations are no such mapping, or a term names an unknown variable or has a
             higher degree than the library.
         """
-        example = "{'x': {'x': -10, 'y': 10}, 'y': {'x': 1}}"
-        rule = f"give each variable its terms, e.g. {example}"
+        rule = "give each variable its terms, e.g. {'x': {'x': -10, 'y': 10}, 'y': {'x': 1}}"
         check_mapping("equations", equations, rule, Mapping)
         names, held = tuple(equations), Library() if library is None else library
         check_instance("library", held, Library)
@@ -661,6 +659,8 @@ def spoken(law: PolynomialSystem, term: int, equation: int) -> str:
 # A law of second order, ``x'' = f(x, x')``, is one of first order in positions and velocities. The
 # velocities are states that nobody has measured, and their half of the law is known: ``x' = v``.
 # So is the time, if there are inputs: a last state, with ``t' = 1``.
+
+OTHERS = "..."  #: All terms of an equation that are not named.
 
 
 @dataclass(frozen=True, eq=False)

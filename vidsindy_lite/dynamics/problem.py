@@ -505,9 +505,8 @@ def pose(
     ]
     unsure = np.concatenate([np.zeros((0, 2)), *(f.unsure for f in form.functions)]) / step
     unsure = np.sort(unsure[np.ptp(unsure, axis=1) > 0.5], axis=0)  # others are known well
-    stretches, curves, noise = _smoothed(
-        trajectories, unsure, rng, PENALTIES[:1] if through else PENALTIES
-    )
+    penalties = PENALTIES[:1] if through else PENALTIES
+    stretches, curves, noise = _smoothed(trajectories, unsure, rng, penalties)
     telling = [len(t) for _, (t, _) in stretches if len(t) >= 4]
     if len(unsure) and sum(telling) < samples / 2:
         raise ValueError(
