@@ -247,11 +247,6 @@ class CameraMotion(NamedTuple):
     maps: Floats
     errors: Floats
 
-    @property
-    def moves(self) -> bool:
-        """Does the camera move at all?"""
-        return not np.array_equal(self.maps, np.broadcast_to(np.eye(3), self.maps.shape))
-
 
 def at_rest(n: int) -> CameraMotion:
     """The motion of a camera that stands still."""

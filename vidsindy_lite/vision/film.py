@@ -170,9 +170,7 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
         looks = Looks(np.full((n, 4), np.nan), np.zeros(n), np.ones(len(seen.frame)))
     else:
         looks = followed(film.frames, film.maps[:n], seen, start, _pace(seen, rows, start.frame))
-    both = _together(
-        seen, looks, film.maps, start.frame, told=seed is not None, moves=len(rows) > 0
-    )
+    both = _together(seen, looks, film.maps, start.frame, told=seed is not None, moves=bool(paths))
     rows, _ = best_path(both, away=True)
     if len(rows) < _SHORTEST:
         return nothing(film.motion, n, film.doubts)
@@ -361,7 +359,7 @@ def _as_track(
     pixels: Floats, errors: Floats, motion: CameraMotion, doubts: tuple[str, ...]
 ) -> Track:
     """Of pixels (n, 2) of the first frame and their errors (n,), infinite where it is not seen."""
-    moves = motion.moves
+    moves = bool((motion.maps != np.eye(3)).any())
     maps = motion.maps[: len(pixels)] if moves else None
     return Track(pixels, _confidence(errors), "motion" if moves else "background", doubts, maps)
 
