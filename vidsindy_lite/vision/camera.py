@@ -138,9 +138,12 @@ def _as_similarity(guess: Floats, size: Ints) -> Floats:
     corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * size.astype(float)
     # As complex numbers, places are turned, scaled and shifted by a line.
     turn, shift = np.polyfit(corners @ [1, 1j], carry(guess, corners) @ [1, 1j], 1)
-    return np.array(
-        [[turn.real, -turn.imag, shift.real], [turn.imag, turn.real, shift.imag], [0, 0, 1]]
-    )
+    return _similarity(turn.real, turn.imag, shift.real, shift.imag)
+
+
+def _similarity(along: float, across: float, right: float, down: float) -> Floats:
+    """The map (3, 3) that turns and scales an image, and shifts it."""
+    return np.array([[along, -across, right], [across, along, down], [0, 0, 1]])
 
 
 def _fit(
@@ -182,10 +185,8 @@ def _fit(
         heavy = steep * weight.ravel()
         normal = heavy @ steep.T + spread**2 * prior
         delta = np.linalg.solve(normal, heavy @ miss.ravel())
-        shift = np.array(
-            [[1 + delta[2], -delta[3], delta[0]], [delta[3], 1 + delta[2], delta[1]], [0, 0, 1]]
-        )
-        here = here @ middle @ np.linalg.inv(shift) @ to_middle
+        step_map = _similarity(1 + delta[2], delta[3], delta[0], delta[1])
+        here = here @ middle @ np.linalg.inv(step_map) @ to_middle
         gain, offset = float(gain + delta[4]), float(offset + delta[5])
         # Pixels of a level of a step that is no longer worth another.
         if np.hypot(delta[0], delta[1]) + np.hypot(delta[2], delta[3]) * width / 2 < 0.01:
