@@ -32,7 +32,6 @@ from __future__ import annotations
 
 import os
 import re
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import chain
@@ -86,7 +85,7 @@ GROSS = 4.0  #: Pixels; real calibrations of real tracks leave up to half of tha
 _FEWEST = 3  # cameras of which nothing is measured
 _MOST = 100  # cameras of a template
 _LOOKS = ("looks_at", "field_of_view", "roll")  # keys that a hand can measure
-_TEXTS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+_TEXTS = read_tree("rig", Path(__file__).with_suffix(".toml"), ".toml")
 _KEYS: dict[str, Any] = _TEXTS["keys"]
 _NAMES: dict[str, list[str]] = _KEYS["names"]
 # Keys that mark a camera as one to be left out: if they are set, or if they are not.

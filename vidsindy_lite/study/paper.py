@@ -86,6 +86,11 @@ class PublishedPosition:
         return float(np.linalg.norm(np.subtract(self.found, self.truth)))
 
 
+def read_toml(name: str) -> dict[str, Any]:
+    """A file of data beside this module."""
+    return tomllib.loads(Path(__file__).with_name(name).read_text("utf-8"))
+
+
 def _law(equations: Mapping[str, Mapping[str, float | str]]) -> PolynomialSystem:
     """A law as it is printed; text is a fraction: "8/3"."""
     return PolynomialSystem.from_terms({
@@ -101,7 +106,7 @@ def _score(row: Sequence) -> PublishedScore:
     return PublishedScore(found == "Yes", false_positives, l2, precision, recall)
 
 
-_PRINTED = tomllib.loads(Path(__file__).with_name("published.toml").read_text("utf-8"))
+_PRINTED = read_toml("published.toml")
 
 #: How many datasets the section "Experiments" claims; its footnote lists those of `SYSTEMS_S1`.
 DATASETS_CLAIMED: int = _PRINTED["datasets_claimed"]
@@ -143,9 +148,7 @@ LAWS: dict[tuple[str, str], PolynomialSystem] = {
 MISPRINTS: tuple[dict[str, str], ...] = tuple(_PRINTED["misprints"])
 
 #: What others publish of ``lorenz_grid`` and ``odebench``, with its source and what was given.
-RIVALS: dict[str, dict[str, Any]] = tomllib.loads(
-    Path(__file__).with_name("rivals.toml").read_text("utf-8")
-)
+RIVALS: dict[str, dict[str, Any]] = read_toml("rivals.toml")
 
 # -------------------------------------------------------------- its systems, and others like them
 
@@ -229,8 +232,6 @@ FLOWS: dict[str, Benchmark] = _Benchmarks(
     SYSTEMS
     | {
         name: _benchmark(name, PolynomialSystem.from_terms(flow["law"]), flow["x0"], flow["period"])
-        for name, flow in tomllib.loads(
-            Path(__file__).with_name("flows.toml").read_text("utf-8")
-        ).items()
+        for name, flow in read_toml("flows.toml").items()
     }
 )

@@ -33,13 +33,11 @@ S. H. Strogatz, Nonlinear Dynamics and Chaos, CRC Press 2018.
 from __future__ import annotations
 
 import time
-import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cache, partial
 from itertools import product
-from pathlib import Path
 from types import CodeType
 from typing import TYPE_CHECKING, Any, NamedTuple
 from unittest.mock import patch
@@ -51,7 +49,7 @@ from ..checks import check_choice
 from ..dynamics import Discovery, PolynomialSystem, noise, path, solver
 from . import corruption
 from .metrics import score
-from .paper import FLOWS, Benchmark
+from .paper import FLOWS, Benchmark, read_toml
 from .trials import find_law
 
 if TYPE_CHECKING:  # pandas is imported where a frame is made
@@ -124,10 +122,7 @@ def _equation(number: str, record: Mapping[str, Any]) -> Equation:
 
 #: The equations by number.
 ODEBENCH: dict[int, Equation] = {
-    int(number): _equation(number, record)
-    for number, record in tomllib.loads(
-        Path(__file__).with_name("odebench.toml").read_text("utf-8")
-    ).items()
+    int(number): _equation(number, record) for number, record in read_toml("odebench.toml").items()
 }
 
 
