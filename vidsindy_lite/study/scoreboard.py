@@ -160,10 +160,8 @@ Motion = Callable[[Benchmark, Floats, Floats, np.random.Generator], Floats]
 
 
 def _coarse(flow: Benchmark, t: Floats, spread: Floats, rng: np.random.Generator) -> Floats:
-    tolerance = 1e-4
-    return corruption.coarse_path(
-        flow, t, flow.x0, "RK45", rtol=tolerance, atol=tolerance * float(spread.min())
-    )
+    atol = 1e-4 * float(spread.min())
+    return corruption.coarse_path(flow, t, flow.x0, "RK45", rtol=1e-4, atol=atol)
 
 
 def _kicked(
@@ -502,14 +500,6 @@ def _first_start_alone(problem: Any, fit: Any, history: Any) -> Any:
     return (*path.persistent(problem, fit, history)[:2], True)
 
 
-def _same(problem: Any, *_: Any) -> Any:
-    return problem
-
-
-def _own(problem: Any, fit: Any, *_: Any) -> Any:
-    return fit
-
-
 #: Of each mechanism, what takes the place of what.
 WITHOUT: dict[str, tuple[tuple[Any, str, Any], ...]] = {
     NOTHING: (),
@@ -520,10 +510,10 @@ WITHOUT: dict[str, tuple[tuple[Any, str, Any], ...]] = {
     "integrated autocorrelation time": ((noise, "effective_noise", noise.residual_noise),
                                         (path, "effective_noise", noise.residual_noise)),
     "errors of the times": ((path, "time_inflation", lambda fit: 1.0),),
-    "weights from the smoother": ((noise, "smoother_weights", _same),),
+    "weights from the smoother": ((noise, "smoother_weights", lambda problem, *_: problem),),
     "noise told by all terms": ((solver, "views", lambda pose: [noise.smoother_weights(pose())]),),
     "process noise": ((solver, "with_process_noise", lambda *_: None),),
-    "free offset": ((path, "framed", _own),),
+    "free offset": ((path, "framed", lambda problem, fit, *_: fit),),
     "richer laws": ((path, "deepest", lambda problem, around, history: around),),
 }  # fmt: skip
 
