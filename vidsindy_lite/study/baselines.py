@@ -49,15 +49,11 @@ WEAK_WINDOWS = 500
 #: clean data, better under noise, erratic all the same.
 WEAK_WIDTH = 0.05
 
-#: For scikit-learn's ridge regression, whose checks of its arguments take longer than such small
-#: regressions: a fit is handed to it in a dozen parts.
-UNCHECKED = {"check_input": False}
-
 #: Values of the candidate terms (k, l) and of the derivatives (k, d): a linear regression.
 Rows = tuple[Floats, Floats]
 
 
-def stlsq(t: Floats, x: Floats, degree: int = 3, ridge: float = RIDGE) -> PolynomialSystem:
+def stlsq(t: Floats, x: Floats, degree: int = 3) -> PolynomialSystem:
     """PySINDy: central differences, then sequentially thresholded least squares.
 
     Parameters
@@ -68,8 +64,6 @@ def stlsq(t: Floats, x: Floats, degree: int = 3, ridge: float = RIDGE) -> Polyno
         States; a row with a NaN is missing.
     degree : int
         Highest degree of the candidate terms.
-    ridge : float
-        Ridge penalty; 0.05 is pysindy's default.
 
     Returns
     -------
@@ -86,7 +80,7 @@ def stlsq(t: Floats, x: Floats, degree: int = 3, ridge: float = RIDGE) -> Polyno
     ----------
     S. L. Brunton, J. L. Proctor, J. N. Kutz, PNAS 113, 3932 (2016).
     """
-    return _discover(t, x, degree, _difference_rows, lambda h: _least_squares(h, ridge))
+    return _discover(t, x, degree, _difference_rows, _least_squares)
 
 
 def ensemble(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> PolynomialSystem:
@@ -224,8 +218,10 @@ def _error(coefficients: Floats, rows: Rows) -> float:
     return float(np.sqrt((squares / spread).mean()))
 
 
-def _least_squares(threshold: float, ridge: float = RIDGE) -> BaseOptimizer:
-    return pysindy.STLSQ(threshold=threshold, alpha=ridge, ridge_kw=UNCHECKED)
+def _least_squares(threshold: float) -> BaseOptimizer:
+    # Scikit-learn's ridge regression checks its arguments for longer than such small regressions
+    # take: a fit is handed to it in a dozen parts.
+    return pysindy.STLSQ(threshold=threshold, alpha=RIDGE, ridge_kw={"check_input": False})
 
 
 def _fit(optimizer: BaseOptimizer, rows: Rows) -> Floats:

@@ -181,17 +181,15 @@ def spline_ado(
     return fit.result()
 
 
-def held_out_misfit(t: Floats, x: Floats, seed: int, rate: float = 0.2, **settings: Any) -> float:
-    """How far the curve of `spline_ado` is from samples that it was not given.
+def held_out_misfit(t: Floats, x: Floats, seed: int, **settings: Any) -> float:
+    """How far the curve of `spline_ado` is from samples that it was not given, one in five.
 
     Parameters
     ----------
     t, x, **settings
         See `spline_ado`.
     seed : int
-        Also of the samples that are held out.
-    rate : float
-        Fraction of the samples that is held out, each by itself.
+        Also of the samples that are held out, each by itself.
 
     Returns
     -------
@@ -199,7 +197,7 @@ def held_out_misfit(t: Floats, x: Floats, seed: int, rate: float = 0.2, **settin
         Root mean square over the spread of each coordinate.
     """
     x = np.asarray(x, dtype=float)
-    out = np.random.default_rng(seed).random(len(x)) < rate
+    out = np.random.default_rng(seed).random(len(x)) < 0.2
     given = np.where(out[:, None], np.nan, x)
     law = spline_ado(t, given, 3, seed, **settings)
     off = (law.curve - x)[np.isnan(given[:, 0]) & ~np.isnan(x[:, 0])] / np.nanstd(x, axis=0)

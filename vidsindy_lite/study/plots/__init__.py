@@ -229,9 +229,9 @@ def plot_frames(
     return figure
 
 
-def _show(axes: Axes, image: Image, extent: tuple[float, ...] | None = None) -> None:
+def _show(axes: Axes, image: Image) -> None:
     """An image as a video reader gives it."""
-    axes.imshow(image.astype(np.uint8), extent=extent, interpolation="nearest")
+    axes.imshow(image.astype(np.uint8), interpolation="nearest")
     axes.grid(False)
     axes.spines[:].set_visible(False)
 
