@@ -383,8 +383,7 @@ def calibration_errors(rig: Rig, truth: Rig) -> Floats:
     check_calibrated("rig", rig)
     check_calibrated("truth", truth)
     learned = check_items("rig", rig.cameras, len(truth.cameras), "camera of truth")
-    pairs = zip(learned, truth.cameras, strict=True)
-    known = ((a.calibration, b.calibration) for a, b in pairs)
+    known = ((a.calibration, b.calibration) for a, b in zip(learned, truth.cameras, strict=True))
     return np.array([(s / r - 1, np.angle(np.exp(1j * (a - b)))) for (s, a), (r, b) in known])
 
 

@@ -714,8 +714,7 @@ def _decomposed(table: dict[str, Any], name: str, warnings: list[str]) -> Iterat
                 f"{name or f'camera [{i}]: '}its pixels are skew, by {told}, which is left out"
             )
         inner[0, 1] = 0
-        shift = -rotation @ place[:3, 0] / place[3]
-        yield table | {"K": inner, "R": rotation, "t": shift}
+        yield table | {"K": inner, "R": rotation, "t": -rotation @ place[:3, 0] / place[3]}
 
 
 def _camera(table: dict[str, Any]) -> PerspectiveCamera:

@@ -289,8 +289,7 @@ class _Videos:
         cameras = self.cameras(footage)
         if cameras is None:
             return None
-        most = 8 if rough else STEPS
-        found = adjust(footage, cameras, self.errors(rough, loose), most=most)
+        found = adjust(footage, cameras, self.errors(rough, loose), most=8 if rough else STEPS)
         return found if in_common(found) else None
 
 

@@ -222,8 +222,7 @@ def _link(one: _Run, other: _Run, cameras: Sequence[Camera]) -> tuple[float, lis
 
 def _surest(count: int, misfit: Callable[[list[int]], float]) -> tuple[float, list[int]]:
     """How many times better the best order of targets fits than the next one, and which it is."""
-    orders = [*map(list, permutations(range(count)))]
-    ranked = sorted((misfit(order), order) for order in orders)
+    ranked = sorted((misfit(order), order) for order in map(list, permutations(range(count))))
     second = ranked[1][0] if len(ranked) > 1 else np.inf
     return second / max(ranked[0][0], 1e-9), ranked[0][1]
 

@@ -173,8 +173,7 @@ def save_slider(
         plt.close(figure)
     (width, height), strip = frames[0].size, io.BytesIO()
     Image.fromarray(np.concatenate([np.asarray(frame) for frame in frames])).save(strip, "PNG")
-    packed = with_palette(strip.getvalue())
-    shown = {"labels": list(figures), "caption": caption, "strip": packed}
+    shown = {"labels": list(figures), "caption": caption, "strip": with_palette(strip.getvalue())}
     return HTML(page("slider.html", width=width, height=height, **shown))
 
 
@@ -345,5 +344,4 @@ def files_of(record: dict) -> list[str]:
 def write_index(folder: Path) -> None:
     """Write the folder's index page (README.md, which code hosts show) from the records."""
     records = list(read_records(folder).values())
-    text = page("index.md", records=records, table_text=table_text)
-    write_file(folder / INDEX, text.encode())
+    write_file(folder / INDEX, page("index.md", records=records, table_text=table_text).encode())

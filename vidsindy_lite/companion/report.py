@@ -414,8 +414,7 @@ def law_over_videos(found: VideoDiscovery, paths: Sequence[str | Path]) -> bytes
 def _view(found: VideoDiscovery, path: Path, i: int, instants: range) -> Iterator[Image]:
     """What one camera saw at these instants, with what it would see of the law; small."""
     camera = found.rig.cameras[i]
-    targets = np.split(found.fitted, found.targets, axis=1)
-    pixels = np.stack([camera.project(x) for x in targets])
+    pixels = np.stack([camera.project(x) for x in np.split(found.fitted, found.targets, axis=1)])
     spread = float(np.sqrt(np.nanmean((found.tracks[i] - np.hstack(list(pixels))) ** 2)))
     width, height = camera.image_size
     scale = _HEIGHT / height

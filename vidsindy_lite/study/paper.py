@@ -209,8 +209,7 @@ PERIODS = {
 def _benchmark(name: str, law: PolynomialSystem, x0: Sequence[float], period: float) -> Benchmark:
     """A system in the library of degree 3."""
     library = monomial_exponents(3, degree=3)
-    coefficients = coefficients_in(law, library)
-    return Benchmark(law.names, library, coefficients, name, tuple(x0), period)
+    return Benchmark(law.names, library, coefficients_in(law, library), name, tuple(x0), period)
 
 
 class _Benchmarks(dict[str, Benchmark]):

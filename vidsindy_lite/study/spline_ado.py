@@ -171,8 +171,7 @@ def spline_ado(
     for _ in range(chosen.alternations):
         before = fit.coefficients != 0
         curve, slopes = fit.collocation()
-        terms = monomials(curve, exponents)
-        fit.coefficients = stridge(terms, slopes, rng, chosen.sparsity_weight)
+        fit.coefficients = stridge(monomials(curve, exponents), slopes, rng, chosen.sparsity_weight)
         settled = np.array_equal(fit.coefficients != 0, before)
         # Where the support is that of before, a last descent from the new coefficients ends it.
         fit.descend(chosen.epochs)

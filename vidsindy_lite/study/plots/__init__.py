@@ -216,8 +216,7 @@ def plot_frames(
         axes.locator_params(nbins=3)
         targets = np.split(track, track.shape[1] // 2, axis=1)
         for j, target in enumerate(targets):
-            name = f"target {j + 1}"
-            axes.plot(*target.T, color=f"C{j}", label=name, lw=1.0, path_effects=halo)
+            axes.plot(*target.T, color=f"C{j}", label=f"target {j + 1}", lw=1.0, path_effects=halo)
         if np.isfinite(targets[0][k]).all():
             _magnify(axes, image, np.concatenate(targets), k)
         if alike:
