@@ -85,17 +85,11 @@ PARTS = {
 SIZE = 16
 STEPS = 60  #: That a search takes at most.
 _LARGEST = 50.0  # logarithm of a scale: a step that leads there is not taken
-_TANGENTIAL = 0.1  # p1 and p2 of a lens, in units of k1
 _OUTLIER = 6.0  # sigma
 _PRIOR_NOISE = 0.02  # pixels; no track is better than that beside a measurement
 _ENOUGH = 1e-7  # of sigma, by which a last step moves the images, or ...
 _IN_TIME = 1e-4  # ... if clocks move, whose slopes are rough, and in frames
-_LONGEST = 1.0  # frames: further than that, the slope in a lag does not hold
 _PROBE = 1e-6  # of a unit: slopes are taken over twice that, and less is no change
-_BESIDE = 2  # frames around an outlier into which interpolation carries a part of it
-_FLAT = 1e-9  # of the largest singular value; in ways of smaller ones a point stays where it is
-# Tried in turn, until a step leads downhill: fine where focal length and distance hardly differ.
-_DAMPING = (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2)
 LAG, DRIFT = PARTS["lag"][0], PARTS["drift"][0]
 
 
@@ -122,7 +116,7 @@ def known_to(given: Camera) -> Floats:
     for part in ("scale", "position", "principal point", "distortion", "readout"):
         errors[PARTS[part]] = getattr(given, f"{part.replace(' ', '_')}_error", 0.0)
     errors[PARTS["normal"] + PARTS["angle"]] = np.deg2rad(given.normal_error)
-    errors[PARTS["distortion"][2:]] *= _TANGENTIAL
+    errors[PARTS["distortion"][2:]] *= 0.1  # p1 and p2, in units of k1
     if not given.is_calibrated:
         errors[PARTS["angle"] + PARTS["scale"]] = np.inf
     if not given.is_placed:
@@ -232,8 +226,8 @@ class Adjustment:
         """Of each frame, (n,): one, unless nothing is seen, it is missed by far, ..."""
         worst = np.nanmax(np.abs(self.misses), axis=1, initial=0.0)
         weights = np.minimum(1.0, _OUTLIER * self.noise / np.maximum(worst, 1e-300)) ** 2
-        if self.timed and len(weights):  # ... or is beside one, as interpolation carries a part
-            weights = minimum_filter1d(weights, 2 * _BESIDE + 1)
+        if self.timed and len(weights):  # ... or is near one, as interpolation carries a part
+            weights = minimum_filter1d(weights, 5)
         return np.where(np.isfinite(self.misses).any(axis=1), weights, 0.0)
 
     @property
@@ -270,7 +264,8 @@ class Adjustment:
         seen = np.isfinite(self.misses)[..., None]
         in_change, in_points = (np.where(seen, np.nan_to_num(part), 0.0) for part in self._slopes())
         q, size, ways = np.linalg.svd(in_points, full_matrices=False)
-        told = size > _FLAT * size.max(axis=1, initial=0, keepdims=True)
+        # In ways of smaller slopes a point stays where it is.
+        told = size > 1e-9 * size.max(axis=1, initial=0, keepdims=True)
         q, back = q * told[:, None], -ways.swapaxes(1, 2) / np.where(told, size, 1.0)[:, None]
         missed = np.nan_to_num(self.misses)[..., None]
         of_change, of_misses = (q.swapaxes(1, 2) @ part for part in (in_change, missed))
@@ -421,10 +416,11 @@ def _downhill(state: Adjustment) -> tuple[Adjustment | None, float]:
         return float(np.sum(weights * squares) / sigma**2 + np.sum(off**2))
 
     here = cost(state)
-    for damping in _DAMPING:
+    # Until a step leads downhill: fine where focal length and distance hardly differ.
+    for damping in (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2):
         damped = np.vstack((triangle, np.sqrt(damping) * np.eye(len(size))))
         step = np.linalg.lstsq(damped, aim, rcond=1e-13)[0] / size
-        step /= max(np.abs(step[lags]).max(initial=0) / _LONGEST, 1.0)
+        step /= max(np.abs(step[lags]).max(initial=0), 1.0)  # a lag's slope holds for a frame
         change, points = state.change.copy(), state.points + reduced.own + reduced.follow @ step
         change[free] += step
         moved = replace(state, change=change, points=points)

@@ -45,12 +45,6 @@ from .models import (
 from .rig import Rig, check_calibrated, check_seen, check_views
 from .unmeasured import posed
 
-_TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1
-# A frame that is missed by more than so many robust standard deviations holds an outlier.
-_OUTLIER = 8.0
-# Motion must tell by so many times the misfit in countless frames, and over sqrt(n) more in n.
-_TELLING, _FEW = 1.45, 8.0
-
 
 class Equations(NamedTuple):
     """Linear equations design @ p = target, (k, p) and (k,), and the frame of each, (k,).
@@ -93,7 +87,8 @@ def _without_outliers(every: Equations, scale: float) -> Equations:
         root = np.sqrt(np.maximum(missed, ROUNDING))
         solution = np.linalg.lstsq(every.design / root[:, None], every.target / root)[0]
         missed = np.abs(every.design @ solution - every.target) / scale
-    limit = max(_OUTLIER * 1.4826 * np.median(missed), ROUNDING) if len(missed) else 0.0
+    # Eight robust standard deviations.
+    limit = max(8.0 * 1.4826 * np.median(missed), ROUNDING) if len(missed) else 0.0
     good = ~np.isin(every.frames, every.frames[missed > limit])
     return Equations(every.design[good], every.target[good], every.frames[good])
 
@@ -123,7 +118,8 @@ def _solved(
     motion = np.linalg.svd(design, compute_uv=False) / np.sqrt(len(design))
     # What is missed by measurements is no noise; a later search takes these for what they are.
     measured = any(any(camera.errors.values()) for camera in cameras)
-    asked_for = min(2.5, _TELLING + _FEW / np.sqrt(len(design))) * misfit
+    # So many times the misfit in countless frames, and more in few.
+    asked_for = min(2.5, 1.45 + 8.0 / np.sqrt(len(design))) * misfit
     if checked and motion[-1] <= max(1e-9 * motion[0], 0.0 if measured else asked_for):
         raise ValueError(
             f"tracks: the target's motion must determine {wanted} of "
@@ -480,7 +476,8 @@ def tracking_errors(
         step = np.gradient(track if motion is None else motion[i], axis=0)
         # Noise has no direction: the trail ends where the target moves by less than that.
         length = np.sqrt((step**2).sum(axis=1, keepdims=True) + noise**2)
-        shifts.append((i, -_TRAIL * noise * np.nan_to_num(step / np.maximum(length, 1e-300))))
+        # Half of the noise; mp4v made up to .6 of it, Motion JPEG .1.
+        shifts.append((i, -0.5 * noise * np.nan_to_num(step / np.maximum(length, 1e-300))))
     for i, track in enumerate(views if raw is None else raw):
         place = _step(track) / np.sqrt(12)  # of what lies anywhere in a step with equal chance
         shifts += [(i, place * axis) for axis in np.eye(2) if place]

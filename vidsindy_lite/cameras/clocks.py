@@ -23,10 +23,8 @@ from ..checks import check_items, check_positive, check_times, check_tracks, che
 
 INSTANTS = 300  #: At which views are compared before all frames are.
 OVERLAP = 0.5  #: Share of the shorter of two videos that both must show.
-_NEAR = 7  # lags around one of which the search goes to the best
 _FARTHEST = 1e9  # frames by which a video may start later; and ...
 _FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
-_ROUNDING = 1e-6  # frames; times that are closer to even ones are even
 
 
 @dataclass(frozen=True)
@@ -127,7 +125,8 @@ def untold_lags(choices: Sequence[Floats]) -> str:
 
 def dips(lags: Floats, missed: Floats) -> list[float]:
     """Whole lags at which less is missed than at all near by, the lowest first."""
-    low = np.flatnonzero(np.isfinite(missed) & (missed == minimum_filter1d(missed, _NEAR)))
+    # Of seven lags in a row, the search goes from any to the best.
+    low = np.flatnonzero(np.isfinite(missed) & (missed == minimum_filter1d(missed, 7)))
     return lags[low[np.argsort(missed[low])]].tolist()
 
 
@@ -371,7 +370,8 @@ class Clock:
         ]
         usual = np.array([np.median(np.diff(times)) if len(times) > 1 else 1 for times in stated])
         frames = [(times - times[0]) / step for times, step in zip(stated, usual, strict=True)]
-        frames = [np.rint(f) if np.abs(f - np.rint(f)).max() < _ROUNDING else f for f in frames]
+        # Times that are that close to even ones are even.
+        frames = [np.rint(f) if np.abs(f - np.rint(f)).max() < 1e-6 else f for f in frames]
         return cls(stated[0], usual[0] / usual, frames)
 
     @classmethod

@@ -75,8 +75,6 @@ USUAL = 5  #: How many of these most lenses have; the others are those of a frac
 TRIMMED = 0.9  #: Share of the instants that must agree; the others may hold anything.
 
 _STEPS = 30  # of Newton, from the linear solution: four or five are usual
-_SETTLED = 1e-14  # of the focal length
-_UNBENT = 20_000  # steps of OpenCV to the ideal image; most in a hair of where the image folds
 _LARGEST = 0.49  # frames; so instants never overtake each other, whatever an outlier says
 _DOWN = np.array([1.0, -1.0])  # the lens's y is down, the ideal image's up
 
@@ -513,7 +511,8 @@ def undistorted(points: Floats, coefficients: Floats) -> Floats:
 
     NaN where the model shows none there, as beyond the circle where its image folds.
     """
-    enough = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, _UNBENT, _SETTLED)
+    # Most steps are taken in a hair of where the image folds; the focal length is the unit.
+    enough = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 20_000, 1e-14)
     found, seen = np.full(points.shape, np.nan), np.isfinite(points).all(axis=1)
     if seen.any():  # a NaN would be tried to the last iteration, and no points are refused
         given = points[seen, None]

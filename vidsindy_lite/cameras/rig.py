@@ -100,7 +100,6 @@ _OTHERS = re.compile(
 _LENSES = f"of {', '.join(LENS)}"
 # Keys that are read, and those that change nothing of what a camera sees.
 _KNOWN = {*chain(_KEYS["known"], _MARKS, *_KEYS["sides"], *_NAMES.values())}
-_SKEWED = 5.0  # pixels, at the edge of the image, that are no camera's
 
 
 @dataclass(frozen=True)
@@ -707,7 +706,7 @@ def _decomposed(table: dict[str, Any], name: str, warnings: list[str]) -> Iterat
         inner /= inner[2, 2]
         skew = abs(inner[0, 1] / inner[1, 1]) * size[1] / 2
         told = f"{skew:.3g} pixels at the edge of the image"
-        if skew > _SKEWED:
+        if skew > 5.0:
             raise ValueError(f"P: must be of a camera with square corners, got a skew of {told}")
         if skew > ROUNDING:
             warnings.append(

@@ -51,23 +51,13 @@ from .models import TRIMMED, Camera, at_once, epipolar_lines, epipolar_rows, mis
 from .rig import ALIKE, BETTER, DISAGREEMENT, FINE, GROSS, Rig, check_seen, paced
 from .unmeasured import posed
 
-_PROMISING = 8  # lags of each camera
 _PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
 _TIMES = LAG, DRIFT
-BLURRED = 0.5  #: Standard error of a lag, in frames, beyond which it counts as unknown.
-
 _SHOWN = 3  # of the lags that fit equally well
 #: Rates over those stated that are taken for each other.
 RATES = ((25, 30), (30, 25), (24, 30), (30, 24), (24, 25), (25, 24), (30, 60), (60, 30))
-_INSTANTS = 60  # at which two views are compared
-_MISTAKES = 16  # of a kind that mend most, tried with all cameras
-_PART, _PARTS = 0.4, (0.0, 0.3, 0.6)  # of the videos, in which their cameras are learned if frames
-# were dropped elsewhere: how long they are, and where they begin
-_FRAMES = 1500  # of the first video at which a jump of the lag is sought
 _LONGEST = 60  # frames by which it may jump
 _PRICE = 20.0  # of a jump, in units of log(1 + miss^2) of a frame
-_MANY = 6  # cameras, of which only two are taken for each other
-_ROUNDING = 1e-9  # scene units, or a share of a slope that is motion
 
 
 def lag_misses(
@@ -172,7 +162,7 @@ def covariance(fit: Adjustment) -> Floats:
     cameras, parts = np.argwhere(fit.free).T
     order = np.concatenate([np.flatnonzero(parts == part) for part in _TIMES])
     # Slopes that are noise add to the information, but mend nothing.
-    share = np.append(1.0, np.maximum(shares(fit), _ROUNDING))[cameras[order]]
+    share = np.append(1.0, np.maximum(shares(fit), 1e-9))[cameras[order]]
     factor = fit.factor[order] / share[:, None]
     return factor @ factor.T
 
@@ -327,7 +317,7 @@ def _learned(videos: _Videos) -> Lags:
 def _searched(videos: _Videos) -> tuple[bool, list[Adjustment]]:
     """Whether cameras should be loose, and fits to some of the instants, the best first."""
     found = lag_misses(videos.given, videos.known)
-    promising = [dips(*misses)[:_PROMISING] or [0.0] for misses in found]
+    promising = [dips(*misses)[:8] or [0.0] for misses in found]
     exact = _climbed(videos, promising, False)
     if not exact or score(exact[0]) <= FINE:
         return False, exact
@@ -401,7 +391,8 @@ def _told(videos: _Videos, fit: Adjustment) -> Lags:
     beside = (rounded - lags)[1:]
     if beside @ np.linalg.pinv(variance) @ beside < count * np.log(fit.used.sum()):
         lags = rounded
-    warnings = [_blurred(i, lags) for i in range(len(lags)) if errors[i] > BLURRED]
+    # Frames, beyond which a lag counts as unknown.
+    warnings = [_blurred(i, lags) for i in range(len(lags)) if errors[i] > 0.5]
     if not fit.settled:
         warnings.append(
             f"the search for the lags of the videos did not converge in {fit.steps} steps: give "
@@ -452,7 +443,7 @@ class Mistake(NamedTuple):
 
 def _paired(footage: Footage, cameras: Sequence[Camera]) -> tuple[float, Floats]:
     """By how much two views disagree at their best lags, all pairs; and these lags."""
-    each = [*lag_misses(footage, cameras, _INSTANTS)]
+    each = [*lag_misses(footage, cameras, most=60)]
     lags = np.array([tried[left.argmin()] for tried, left in each])
     return float(np.linalg.norm([left.min() for _, left in each])), lags - lags[0]
 
@@ -500,7 +491,7 @@ def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | No
             ]
             tried = [
                 (_worst(fit), fit, what, mended, known)
-                for _, best, what, mended, known in sorted(ranked, key=itemgetter(0))[:_MISTAKES]
+                for _, best, what, mended, known in sorted(ranked, key=itemgetter(0))[:16]
                 for fit in _fits(mended, known, start, best)
             ]
             for now, fit, what, mended, known in sorted(tried, key=itemgetter(0)):
@@ -562,8 +553,8 @@ def _whole(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str
 
 
 def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
-    """Orders in which two views change places, or three in a ring; and which these are."""
-    for size in (2, 3) if count < _MANY else (2,):
+    """Orders in which two views change places, or three of a few in a ring; and which these are."""
+    for size in (2, 3) if count < 6 else (2,):
         for moved, turn in product(combinations(range(count), size), range(1, size)):
             order = np.arange(count)
             order[[*moved]] = np.roll(moved, turn)
@@ -573,8 +564,9 @@ def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
 def _dropped(given: Footage, rig: Rig, names: Sequence[str]) -> Iterator[tuple[str, Footage, Rig]]:
     """Videos of which frames were dropped, with the clocks by which they agree all the time."""
     length, ways = given.lengths.min(), []
-    for low in _PARTS:  # in one of them none is dropped, maybe: its cameras tell when
-        begins, ends = length * np.outer([low, low + _PART], given.rates)
+    # Parts of the videos: in one of them none is dropped, maybe: its cameras tell when.
+    for low, high in ((0.0, 0.4), (0.3, 0.7), (0.6, 1.0)):
+        begins, ends = length * np.outer([low, high], given.rates)
         rows = [(b <= c) & (c <= e) for b, c, e in zip(begins, given.clocks, ends, strict=True)]
         tracks, clocks = (
             [x[r] for x, r in zip(each, rows, strict=True)] for each in (given.tracks, given.clocks)
@@ -607,7 +599,7 @@ def _jumped(given: Footage, mended: Footage, fit: Adjustment) -> tuple[float, Fl
     curves, missed_before, ways = mended.curves, 0.0, []
     each = zip(fit.cameras, given.clocks, curves, strict=True)
     for i, (camera, stated, curve) in enumerate(each):
-        stride = -(-len(stated) // _FRAMES)
+        stride = -(-len(stated) // 1500)  # jumps are sought at so many frames at most
         late = (curve.clock - stated)[::stride]
         middle = np.rint(late.mean())
         instants = (stated[::stride] + middle + tried[:, None]) / rates[i] + lags[i]

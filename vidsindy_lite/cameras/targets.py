@@ -24,8 +24,6 @@ from .models import Camera, at_once, independent, intersect, missed
 from .rig import ALIKE, Rig
 
 _SHORTEST = 4  # frames of a run, and of what two runs have in common
-_NEAR, _NOISE = 2.0, 2.0  # by how much closer, in times and pixels, a target is to where it goes
-_FEW = 0.05  # share of the frames
 _AHEAD, _DEGREE = 6, 4  # frames on both sides of a gap, through which a target goes like t^4
 
 
@@ -96,7 +94,7 @@ def identify(tracks: Sequence[Floats], rig: Rig) -> Identities:
         told[run.view][run.frames] = run.places
     flat = [view.reshape(len(view), -1) for view in told]
     left = sum(_size(part, cameras)[1] for part in others)
-    if left < _FEW * len(views[0]):  # a few frames that are left out do no harm
+    if left < 0.05 * len(views[0]):  # a few frames that are left out do no harm
         return Identities(flat, ())
     doubt = (
         f"targets: {left} frames are left out, e.g. from frame {min(map(_first, others))} on: who "
@@ -133,7 +131,8 @@ def _runs(number: int, view: Floats) -> list[_Run]:
     miss = np.linalg.norm(ahead[:, :, None] - view[1:, None], axis=3)
     own = np.einsum("nkk->nk", miss).max(axis=1)
     miss[:, *np.diag_indices(view.shape[1])] = np.inf
-    mistaken = miss.min(axis=(1, 2), initial=np.inf) < _NEAR * own + _NOISE
+    # By so much closer, in times and pixels, a target is to where it goes.
+    mistaken = miss.min(axis=(1, 2), initial=np.inf) < 2.0 * own + 2.0
     ends = 1 + np.flatnonzero((np.diff(frames) > 1) | mistaken[frames[:-1]])
     parts = [part for part in np.split(frames, ends) if len(part) >= _SHORTEST]
     return [_Run(number, part, view[part]) for part in parts]

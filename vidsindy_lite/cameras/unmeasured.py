@@ -45,16 +45,9 @@ from .rig import ALIKE, BETTER, FINE, GROSS, Rig, check_views
 
 _FEWEST = 8  # frames in common of a pair
 _VIEWS = np.geomspace(2, 90, 15)  # degrees across an image: what lenses have
-_STARTS, _LAGS = 4, 10  # of all, from which a search begins
-_STEPS = 30  # of each such search
-_FLAT = 1e-3  # of the largest axis: what rounding leaves of a motion in a plane
+_STEPS = 30  # of each search
 
-_EITHER_HAND = (
-    "whether the path is the true one or its mirror image cannot be told, as the cameras are "
-    "too far away: measure roughly where they stand, or come closer"
-)
 _Pose = tuple[NDArray[Any], NDArray[Any]]  # OpenCV's rotation and shift
-_PROMISING = 20  # lags of each view
 _NOTE = (
     "nothing is known of the cameras: the path is known but for an affine map, its axes are those "
     "of its spread, largest first; of a linear law frequencies and dampings do not depend on it"
@@ -85,7 +78,7 @@ def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True, most: fl
     check_views(tracks, rig)
     starts = sorted(_starts(tracks, rig), key=lambda start: start[0])
     footage, fits = Footage.of(tracks), []
-    for _, cameras in starts[:_STARTS]:
+    for _, cameras in starts[:4]:
         # Known are the place of the first camera, and of all others only their lenses.
         errors = np.array([known_to(camera) for camera in cameras])
         for part in ("normal", "angle", "position"):
@@ -210,7 +203,8 @@ def _far_away(
     q = np.tensordot(np.linalg.svd(equations)[2][-1], basis, axes=1)
     values, axes = np.linalg.eigh(q)
     values = values * np.sign(values.sum())
-    root = axes * np.sqrt(np.maximum(values, _FLAT * values.max()))
+    # Of a motion in a plane, rounding leaves less than that of the third axis.
+    root = axes * np.sqrt(np.maximum(values, 1e-3 * values.max()))
     for mirror in ([1, 1, 1], [1, 1, -1]):
         poses = []
         for rows, camera, centre in zip(
@@ -255,8 +249,11 @@ def _framed(rig: Rig, fit: Adjustment, mirrored: bool) -> Rig:
     each = zip(fit.cameras, places, strict=True)
     first, *others = (replace(camera, position=place) for camera, place in each)
     loose = [replace(camera, position_error=distance, normal_error=45.0) for camera in others]
-    doubts = (_EITHER_HAND,) if mirrored else ()
-    return Rig((first, *loose), doubts, _note(rig))
+    either_hand = (
+        "whether the path is the true one or its mirror image cannot be told, as the cameras are "
+        "too far away: measure roughly where they stand, or come closer"
+    )
+    return Rig((first, *loose), (either_hand,) if mirrored else (), _note(rig))
 
 
 def _note(rig: Rig) -> str:
@@ -352,13 +349,13 @@ def _best(
     count, lags, others = len(footage.curves), np.zeros(1), list[Floats]()
     if synchronous:
         return _left(footage, footage.lags, range(count), rank), footage.lags, np.zeros(count), []
-    promising = [_promising(footage, i, rank)[:_PROMISING] or [0.0] for i in range(1, count)]
+    promising = [_promising(footage, i, rank)[:20] or [0.0] for i in range(1, count)]
     for further in (product(*promising[:2]), *map(product, promising[2:])):
         every = [(*lags, *new) for new in further]
         views = range(len(every[0]))
         every.append(tuple(footage.lags[: len(views)]))
         tried = sorted((_left(footage, np.array(late), views, rank), late) for late in every)
-        found = [_polished(footage, np.array(late), rank) for _, late in tried[:_LAGS]]
+        found = [_polished(footage, np.array(late), rank) for _, late in tried[:10]]
         left = np.array([_left(footage, late, views, rank) for late, _ in found])
         alike = np.flatnonzero(left <= max(ALIKE * left.min(), FINE))
         shortest = min(alike, key=lambda k: np.abs(found[k][0]).sum())
