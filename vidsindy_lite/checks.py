@@ -26,7 +26,6 @@ T = TypeVar("T")
 #: Largest coordinate of a track or a state: the squares of larger ones are no numbers any more.
 FARTHEST = 1e100
 LARGEST_SIDE = 32768  #: Pixels of a camera's image, in width and in height: no sensor has more.
-LARGEST_INTEGER = 2**63 - 1  #: Larger ones are none to numpy and to most files.
 #: What is raised where something from outside is turned into values, and is malformed.
 MALFORMED = (
     ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RuntimeError, ImportError,
@@ -94,7 +93,7 @@ def check_integer(name: str, value: int, least: int = 0) -> int:
     """An integer of at least ``least``; with the default, a seed or an index."""
     if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
         raise ValueError(f"{name}: must be an integer of at least {least}, got {shown(value)}")
-    if value > LARGEST_INTEGER:
+    if value >= 2**63:  # which is none to numpy and to most files
         raise ValueError(f"{name}: must be an integer below 2^63, got {shown(value)}")
     return int(value)
 

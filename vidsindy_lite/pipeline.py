@@ -37,11 +37,6 @@ from .dynamics import Discovery, Library, Quantity, Round, Swing
 from .progress import bar
 from .vision import Hint, TrackFile
 
-_OTHER_LAG = 0.02  # frames by which it may differ without a word
-_SMOOTHED = 8  # frames of a stretch, from which its curve can be told from noise
-_WILD = 8.0  # medians of what places miss their neighbours by, from which on one is no motion
-_WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
-
 
 @dataclass(frozen=True, eq=False)
 class Observation:
@@ -303,7 +298,7 @@ def _observed(
             lags, start = None, mistake.lags.frames
         with refusing("lags", raw, names):
             best = cameras.learn_lags(raw, rig, clock.rates, start, clock.frames, progress=progress)
-            if lags is not None and _apart(lags, best, _WRONG_LAG):
+            if lags is not None and _apart(lags, best, 0.5):
                 raise ValueError(
                     f"lags: must make the views agree, got ({cameras.list_lags(lags)}) frames "
                     f"where ({cameras.list_lags(best.frames)}) do: leave them out, or check them"
@@ -424,7 +419,7 @@ def _smoothed(t: Floats, values: Floats) -> Floats:
     clean, rng = values.copy(), np.random.default_rng(0)
     seen = np.flatnonzero(np.isfinite(values).all(axis=1))
     for stretch in np.split(seen, np.flatnonzero(np.diff(seen) > 1) + 1):
-        if len(stretch) >= _SMOOTHED:
+        if len(stretch) >= 8:  # frames, from which its curve can be told from noise
             curve = dynamics.smooth([(t[stretch], values[stretch])], rng).splines[0]
             clean[stretch] = curve(t[stretch])
     return clean
@@ -463,7 +458,8 @@ def without_wild(track: Floats, name: str) -> tuple[Floats, str]:
     """
     kept = seen = np.flatnonzero(np.isfinite(track).all(axis=1))
     most, wild = len(seen) // 10, list[int]()
-    limit = max(_WILD * float(np.median(_missed(seen, track))), cameras.GROSS) if most else np.inf
+    # Medians of what places miss their neighbours by, from which on one is no motion.
+    limit = max(8.0 * float(np.median(_missed(seen, track))), cameras.GROSS) if most else np.inf
     while len(seen) <= len(kept) + most and ((apart := _missed(kept, track)) > limit).any():
         highest = sliding_window_view(np.pad(apart, 4), 9).max(axis=1)
         kept = kept[(apart <= limit) | (apart < highest)]
@@ -538,7 +534,7 @@ def _rig_warnings(
     """
     told, worst, where = f"({cameras.list_lags(best.frames)})", max(missed), ""
     few = worst <= cameras.GROSS
-    if _apart(lags, best, _OTHER_LAG):  # by too little to refuse them
+    if _apart(lags, best, 0.02):  # by too little to refuse them
         if worst <= cameras.DISAGREEMENT:
             return [
                 "the lags that are given differ from those of the tracks: "
@@ -570,7 +566,6 @@ def _rig_warnings(
 
 #: Spread across a plane or a line, over the errors of places, up to which a motion stays in it.
 STILL = 1.5
-_OTHER_CLOCK = 1e-3  # share by which given and stated frame rates may differ without a word
 
 
 @dataclass(frozen=True, eq=False)
@@ -836,7 +831,7 @@ def times_of(
     doubts = [
         f"fps: {given:g} frames in a unit of time are taken as given, though {name} states "
         f"{rate:.4g}"
-        for name, rate in rates if abs(rate / given - 1) > _OTHER_CLOCK
+        for name, rate in rates if abs(rate / given - 1) > 1e-3
     ]  # fmt: skip
     return [np.arange(len(track.pixels)) / given for track in read], doubts
 
@@ -976,11 +971,6 @@ def directions(t: Floats, x: Floats, apart: float = 0.0) -> Floats:
 
 # ----------------------------------------------------------------------------------------- refusals
 
-_JUMP = 8.0  # medians of a track's steps; more is a jump, ...
-_JUMPY = 0.02  # ... and a track with more of them than this, ...
-_STILL = 2.0  # pixels; ... or one that stays within that, ...
-_SPARSE = 0.5  # ... or of a target that is seen in fewer frames than that, may be of something else
-
 
 class _Ended(BaseException):
     """An exception that holds what there is already."""
@@ -1044,8 +1034,9 @@ def _is_strange(track: Floats) -> bool:
     seen = np.isfinite(track).all(axis=1)
     steps, turns = (np.hypot(*np.diff(track, n, axis=0).T) for n in (1, 2))
     steps, turns = steps[np.isfinite(steps)], turns[np.isfinite(turns)]
-    if not len(turns) or seen.mean() < _SPARSE:
+    if not len(turns) or seen.mean() < 0.5:
         return True
-    jumps = np.mean(steps > _JUMP * max(np.median(steps), 1.0)) > _JUMPY
-    still = np.ptp(track[seen], axis=0).max() < _STILL
+    # One step in fifty is a jump, of eight medians of all.
+    jumps = np.mean(steps > 8.0 * max(np.median(steps), 1.0)) > 0.02
+    still = np.ptp(track[seen], axis=0).max() < 2.0  # pixels
     return bool(jumps or still or np.median(turns) > np.median(steps))

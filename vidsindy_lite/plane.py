@@ -41,7 +41,6 @@ SURE = 3.0  #: Standard errors from which on a difference is one.
 TILTED = np.deg2rad(2.0)
 #: Of the vertical of a picture, where no other is given: a telephone is held upright by hand.
 HELD = np.deg2rad(10.0)
-FOCAL = 0.75  #: Focal length of a telephone over the longer side of its picture.
 TABLES = (".csv", ".tsv", ".txt", ".xml", ".dat")  #: How the names of files end that hold a track.
 SPACE = np.eye(2, 3)  #: From places in the plane, (n, 2), to the same in space, (n, 3).
 
@@ -357,7 +356,8 @@ def _tilts(camera: PlaneCamera, pixels: Floats, middle: Floats) -> list[Floats]:
     is nearer to the camera or farther away.
     """
     away = pixels - middle
-    nearer = TILTED * away / (FOCAL * max(camera.image_size))
+    # The focal length of a telephone over the longer side of its picture.
+    nearer = TILTED * away / (0.75 * max(camera.image_size))
     x = mapped(camera.homography, pixels)
     return [mapped(camera.homography, pixels + nearer[:, [j]] * away) - x for j in (0, 1)]
 

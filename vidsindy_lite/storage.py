@@ -33,7 +33,6 @@ LARGEST_TEXT = 500_000_000
 MOST_DIGITS = 300  #: Of a number: a longer one is none of ours.
 DEEPEST = 100  #: Levels of a tree: OpenCV's readers of deeper ones overflow their stack.
 TREES = (".toml", ".json", ".yaml", ".yml", ".xml")  #: Suffixes of files that hold a tree.
-_HEAD = 4096  # characters that tell text from what is none
 
 
 @contextmanager
@@ -88,7 +87,7 @@ def read_text(name: str, path: Path, kind: str, fallback: str | None = None) -> 
         text = raw.decode(encoding)
     except UnicodeDecodeError:
         text = raw.decode(fallback) if fallback else "\0"  # which no text holds
-    if any(mark < " " and not mark.isspace() for mark in text[:_HEAD]):
+    if any(mark < " " and not mark.isspace() for mark in text[:4096]):
         raise ValueError(f"{name}: must be {kind} in UTF-8, got '{path.name}', which is none")
     digits = re.search(rf"\d{{{MOST_DIGITS},}}", text)
     if digits:
