@@ -39,9 +39,7 @@ from .report import page
 
 INDEX = "README.md"
 DIGITS = 6  # of the numbers in the records
-PICTURE = 83  # milliseconds that one of an animation stays
 PALETTE = Image.Quantize.FASTOCTREE  # a small target keeps its colour, and so does white
-SLIDER_DPI = 100  # dots per inch of its frames
 PICTURES = {"figure": [".png"], "animation": [".gif"], "table": []}  # files of a kind
 
 
@@ -130,7 +128,7 @@ def save_animation(
     palette = Image.fromarray(np.concatenate(pictures)).quantize(256, PALETTE)
     images = (Image.fromarray(picture) for picture in pictures)
     first, *rest = (one.quantize(palette=palette, dither=Image.Dither.NONE) for one in images)
-    durations, file = [PICTURE] * len(rest) + [3000], io.BytesIO()
+    durations, file = [83] * len(rest) + [3000], io.BytesIO()  # milliseconds
     first.save(file, "GIF", save_all=True, append_images=rest, duration=durations, loop=0)
     _write(record, file.getvalue())
 
@@ -165,7 +163,7 @@ def save_slider(
     if not figures:
         raise ValueError(f"figures: slider {slider_id!r} needs at least one figure, got none")
     save_figure(slider_id, next(iter(figures.values())), caption=caption, numbers=numbers)
-    with plt.rc_context({"savefig.dpi": SLIDER_DPI}):
+    with plt.rc_context({"savefig.dpi": 100}):
         frames = [
             Image.open(io.BytesIO(_png(figure))).convert("RGB") for figure in figures.values()
         ]

@@ -45,18 +45,11 @@ PAGE, DATA, RIG, TRACKS = FILES = ("report.html", "result.json", "rig.toml", "tr
 FORMAT = 1  # of result.json: counts up when what is in it changes its meaning
 
 _TITLES = ("<title>Law of a moving target", "<title>No law: ")  # of pages that are ours
-_HEAD = 1000  # characters
 
-FRAMES = 24  # of each video on the page
-_LONGEST = 1280  # pixels of a frame's longer side there
-_QUALITY = 80  # of the frames' compression
+FRAMES = 24  # of each video on the page to show the target on
 
-_INSTANTS = 200  # of the film at most
-_RATE = 25  # frames a second
 _HEIGHT = 270  # pixels of each view, which stand side by side
-_TRAIL = 40  # frames of the film that the curve reaches back
 _CURVE = (0, 114, 178)  # as in the figures
-_TUBE = 2.0  # standard deviations of the track around the law
 _FAINT = 0.4  # share of the tube's colour
 
 _PAGES = jinja2.Environment(
@@ -97,7 +90,7 @@ def write_page(name: str, path: str | os.PathLike, template: str, **values: obje
 def _holds(path: Path, *marks: str) -> bool:
     """Whether a file is there and can be read, and one of these marks is near its beginning."""
     try:
-        start = path.read_text("utf-8", "replace")[:_HEAD]
+        start = path.read_text("utf-8", "replace")[:1000]
     except OSError:
         return False
     return any(mark in start for mark in marks)
@@ -404,11 +397,11 @@ def law_over_videos(found: VideoDiscovery, paths: Sequence[str | Path]) -> bytes
     -------
     bytes
     """
-    instants = range(0, len(found.t), -(-len(found.t) // _INSTANTS))
+    instants = range(0, len(found.t), -(-len(found.t) // 200))  # so many at most
     views = [_view(found, Path(path), i, instants) for i, path in enumerate(paths)]
     frames = (np.hstack(images) for images in zip(*views, strict=True))
     with tempfile.TemporaryDirectory() as own:
-        return write_video(Path(own) / "law.webm", frames, _RATE, "VP9").read_bytes()
+        return write_video(Path(own) / "law.webm", frames, fps=25, codec="VP9").read_bytes()
 
 
 def _view(found: VideoDiscovery, path: Path, i: int, instants: range) -> Iterator[Image]:
@@ -426,7 +419,8 @@ def _view(found: VideoDiscovery, path: Path, i: int, instants: range) -> Iterato
         if number > max(before, -1):
             image = next(frames, grey)
         shown = cast("Image", cv2.resize(image, size, interpolation=cv2.INTER_AREA))
-        for trail in pixels[:, instants[max(j - _TRAIL, 0)] : instants[j] + 1]:
+        # The curve reaches forty frames of the film back.
+        for trail in pixels[:, instants[max(j - 40, 0)] : instants[j] + 1]:
             shown = _drawn(shown, (trail + 0.5) * scale - 0.5, spread * scale)
         yield shown
 
@@ -437,7 +431,7 @@ def _drawn(image: Image, trail: Floats, spread: float) -> Image:
     if not len(shown):
         return image
     line = [np.rint(shown).astype(np.int32)[:, None]]
-    width = int(np.clip(2 * _TUBE * spread, 3, _HEIGHT))
+    width = int(np.clip(4 * spread, 3, _HEIGHT))  # two standard deviations to both sides
     tube = cv2.polylines(image.copy(), line, False, _CURVE, width, cv2.LINE_AA)
     drawn = cv2.addWeighted(tube, _FAINT, image, 1 - _FAINT, 0)
     cv2.polylines(drawn, line, False, _CURVE, 1, cv2.LINE_AA)
@@ -475,10 +469,10 @@ def _video(path: Path) -> dict[str, object]:
     """Name and size of a video, and frames spread through it."""
     info = video_info(path)
     numbers = np.unique(np.linspace(0, info.frames - 1, FRAMES).round().astype(int)).tolist()
-    shrunk = min(1.0, _LONGEST / max(info.size))
+    shrunk = min(1.0, 1280 / max(info.size))
     frames = []
     for number, image in zip(numbers, pick_frames(path, numbers), strict=False):
         small = cv2.resize(image, None, fx=shrunk, fy=shrunk, interpolation=cv2.INTER_AREA)
-        _, packed = cv2.imencode(".jpg", small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+        _, packed = cv2.imencode(".jpg", small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 80])
         frames.append({"number": number, "image": packed.tobytes()})
     return {"name": path.name, "size": info.size, "frames": frames}

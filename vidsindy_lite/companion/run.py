@@ -35,10 +35,7 @@ from ..storage import PACKAGE, code_hash, repository_root, write_file
 from .artifacts import read_records, with_palette, write_index
 from .compare import outdated, replace, same_notebook
 
-PROFILES = ("full", "quick")
-AT_ONCE = 3  # notebooks: where one waits for the last task of a sweep, another goes on
 CELL_TIMEOUT = 3600  # seconds; papermill's own default is to wait for ever
-STARTS = 3  # of a kernel: two that begin at once may be given the same port, and one then dies
 EXECUTED, LOG = "executed.ipynb", "log.txt"  # in the folder of a run
 
 # Papermill, which ends its kernel before itself, also where this process is closed or killed.
@@ -52,7 +49,6 @@ if sys.platform == "linux":
     ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG
 from papermill.cli import papermill
 papermill()"""
-OPTIONS = ("--kernel", "python3", "--no-progress-bar", "--log-level", "ERROR")
 _RUNNING: set[subprocess.Popen] = set()  # papermills, which end with the run
 
 
@@ -136,7 +132,7 @@ def run(
     FileNotFoundError
         If there is no repository around the working directory.
     """
-    check_choice("profile", profile, PROFILES)
+    check_choice("profile", profile, ("full", "quick"))
     root = repository_root()
     output = root if profile == "full" else root / "build" / "quick"
     chosen, figures = select_notebooks(notebooks, root), output / "figures"
@@ -149,7 +145,8 @@ def run(
     outcomes = []
     shown = bar(None, "notebooks", total=len(chosen), leave=False)
     try:
-        with ThreadPool(AT_ONCE) as pool, shown:
+        # Where one waits for the last task of a sweep, another goes on.
+        with ThreadPool(3) as pool, shown:
             for outcome in pool.imap_unordered(work, by_size):
                 outcomes.append(outcome)
                 with shown.external_write_mode():
@@ -212,11 +209,13 @@ def execute(
         "PYTHONHASHSEED": "0",  # the order of a set is then the same in every run
     }
     command: list[str | Path] = [
-        sys.executable, "-c", PAPERMILL, folder / EXECUTED, folder / EXECUTED, *OPTIONS,
+        sys.executable, "-c", PAPERMILL, folder / EXECUTED, folder / EXECUTED,
+        "--kernel", "python3", "--no-progress-bar", "--log-level", "ERROR",
         "--cwd", path.parent, "--execution-timeout", str(CELL_TIMEOUT),
         "-y", json.dumps(dict(parameters)),
     ]  # fmt: skip
-    for _ in range(STARTS):
+    # Two kernels that begin at once may be given the same port, and one then dies.
+    for _ in range(3):
         with (
             open(folder / LOG, "w") as log,
             subprocess.Popen(command, env=variables, stdout=log, stderr=log) as process,

@@ -11,9 +11,6 @@ from ..arrays import Bools, Floats, Ints
 from ..checks import check_array, shown
 from ..dynamics import Discovery, PolynomialSystem, runge_kutta_4
 
-SUBSTEPS = 8  #: Runge-Kutta steps between two measurements.
-VAGUE = 1e4  #: Prior standard deviation, relative to the size of what is unknown: as good as none.
-
 
 @dataclass(frozen=True, eq=False)
 class Score:
@@ -261,9 +258,8 @@ def cramer_rao_bound(
     observe[:, d + count :] = np.eye(d)[:, moving]
     spread = np.ptp(x, axis=0).max() + np.abs(x).max()
     known = np.abs(system.coefficients[terms, equations])
-    root = VAGUE * np.diag(
-        np.concatenate([np.full(d, spread), known, np.full(moving.sum(), spread)])
-    )
+    # A prior standard deviation of so many times what is unknown is as good as none.
+    root = 1e4 * np.diag(np.concatenate([np.full(d, spread), known, np.full(moving.sum(), spread)]))
     root = _measured(root, observe, sigma)
     carry = np.eye(free)
     for step, response in zip(steps, responses, strict=True):
@@ -300,6 +296,6 @@ def _sensitivities(
         return np.asarray(width * np.hstack([system(state), growth.reshape(len(both), -1)]))
 
     begin = np.tile(np.eye(d, d + len(terms)).ravel(), (len(x) - 1, 1))
-    end = runge_kutta_4(rates, np.array([0.0, 1.0]), np.hstack([x[:-1], begin]), SUBSTEPS)[1]
+    end = runge_kutta_4(rates, np.array([0.0, 1.0]), np.hstack([x[:-1], begin]), substeps=8)[1]
     sensitivity = end[:, d:].reshape(len(end), d, -1)
     return sensitivity[:, :, :d], sensitivity[:, :, d:]

@@ -50,15 +50,11 @@ if TYPE_CHECKING:  # pandas is imported where a frame is made
 
 #: Frames in one characteristic period of a system: playback speed differs per system.
 SAMPLES_PER_PERIOD = 100
-#: The three videos of a film start at the same time, and whoever filmed them knows.
-TOGETHER = (0.0, 0.0, 0.0)
 #: Side in pixels of the square in which the learned detector looks for the target of a film.
 WINDOW = 64
 
 _GRID = 16  # pixels; from one such step to the next the detector's anchors are where they were
 _BATCH = 32  # windows that the detector sees at once
-
-_SAME_TARGET = ("shape", "colour", "size", "shape_seed", "turns")  # fields of Scene
 
 
 @dataclass(frozen=True)
@@ -128,7 +124,8 @@ def film(
     rig = Rig.around(x)
     target, *views = np.random.SeedSequence(seed).spawn(1 + len(rig.cameras))
     drawn = Scene.random(np.random.default_rng(target))
-    common = {key: getattr(drawn, key) for key in _SAME_TARGET} | disturbances
+    same = ("shape", "colour", "size", "shape_seed", "turns")
+    common = {key: getattr(drawn, key) for key in same} | disturbances
     paths, scenes = [], []
     for number, (camera, view) in enumerate(zip(rig.cameras, views, strict=True), start=1):
         draw, disturb = view.spawn(2)
@@ -200,7 +197,8 @@ def run_film(task: FilmTask) -> FilmResult:
     with TemporaryDirectory() as folder:
         shot = film(task.system, folder, task.frames, task.trial)
         began = time.perf_counter()
-        seen = observe(shot.paths, shot.rig.uncalibrated(keep=0), shot.t, lags=TOGETHER)
+        # The videos start at the same time, and whoever filmed them knows.
+        seen = observe(shot.paths, shot.rig.uncalibrated(keep=0), shot.t, lags=(0, 0, 0))
         seconds = time.perf_counter() - began
         detected = tuple(map(detect_near, shot.paths, seen.tracks))
     pixel_error = tuple(

@@ -42,9 +42,6 @@ LINES = ({"color": "0.75", "lw": 4}, {"color": "C0", "lw": 1})
 #: The truth, and over it a path with gaps.
 DASHED = ({"color": "0.4", "ls": "--", "lw": 0.8}, {"color": "C0", "lw": 1.4})
 
-SIGHTS = 5  # instants at which lines of sight are drawn
-DEPTH = 0.15  # of a pinhole's distance from the path: where its image is drawn
-
 
 def finish_space(
     axes: Axes3D, azimuth: float, elevation: float, zoom: float = 1.05, unit: str = "scene units"
@@ -96,11 +93,11 @@ def plot_rig(rig: Rig, x: Floats) -> Figure:
     figure, axes = plt.subplots(figsize=(7.5, 5.5), subplot_kw=SPACE)
     axes.plot(*x.T, color="k", lw=0.8)
     shown = np.flatnonzero(np.isfinite(x).all(axis=1))
-    points = x[shown[np.linspace(0, len(shown) - 1, SIGHTS).astype(int)]]
+    points = x[shown[np.linspace(0, len(shown) - 1, 5).astype(int)]]
     axes.scatter(*points.T, color="k", s=8)
     for i, camera in enumerate(rig.cameras):
         # A pinhole's image is drawn close to it.
-        away = DEPTH * float(np.linalg.norm(points.mean(axis=0) - np.asarray(camera.position)))
+        away = 0.15 * float(np.linalg.norm(points.mean(axis=0) - np.asarray(camera.position)))
         seen = on_plane(camera, camera.project(x), away)
         axes.plot(*seen.T, color=f"C{i}", lw=0.8, label=f"camera {i + 1}")
         draw_plane(axes, camera, f"C{i}", away)
