@@ -323,10 +323,8 @@ def _whole(path: Path, folder: Path, status: int) -> NotebookNode:
         for output in cell.outputs:
             if output.output_type == "error":
                 source = "\n".join(f"    {line}" for line in cell.source.splitlines())
-                what = [
-                    strip_color("\n".join(output.traceback)),
-                    *(x for x in log if "timed out" in x),
-                ]
                 where = f"{path.stem}, cell In [{cell.execution_count}]:\n\n{source}"
-                raise NotebookError("\n\n".join([where, *what]))
+                raised = strip_color("\n".join(output.traceback))
+                late = [line for line in log if "timed out" in line]
+                raise NotebookError("\n\n".join([where, raised, *late]))
     raise NotebookError(f"{path.stem} did not run to its end: {log[-1]}")

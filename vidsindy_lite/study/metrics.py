@@ -253,9 +253,7 @@ def cramer_rao_bound(
     count, free = len(terms), d + len(terms) + int(moving.sum())
     x = system.simulate(t, x0)
     steps, responses = _sensitivities(system, t, x, equations, terms)
-    observe = np.zeros((d, free))
-    observe[:, :d] = np.eye(d)
-    observe[:, d + count :] = np.eye(d)[:, moving]
+    observe = np.hstack([np.eye(d), np.zeros((d, count)), np.eye(d)[:, moving]])
     spread = np.ptp(x, axis=0).max() + np.abs(x).max()
     known = np.abs(system.coefficients[terms, equations])
     # A prior standard deviation of so many times what is unknown is as good as none.
@@ -275,10 +273,7 @@ def cramer_rao_bound(
 def _measured(root: Floats, observe: Floats, sigma: Floats) -> Floats:
     """Square root of the covariance after a measurement (the array form of the Kalman update)."""
     m, free = observe.shape
-    array = np.zeros((m + free, m + free))
-    array[:m, :m] = np.diag(sigma)
-    array[:m, m:] = observe @ root
-    array[m:, m:] = root
+    array = np.block([[np.diag(sigma), observe @ root], [np.zeros((free, m)), root]])
     lower = np.asarray(np.linalg.qr(array.T, mode="r")).T
     return lower[m:, m:]
 
