@@ -298,7 +298,7 @@ def _observed(
             lags, start = None, mistake.lags.frames
         with refusing("lags", raw, names):
             best = cameras.learn_lags(raw, rig, clock.rates, start, clock.frames, progress=progress)
-            if lags is not None and _apart(lags, best, 0.5):
+            if lags is not None and _apart(lags, best, 0.5):  # frames
                 raise ValueError(
                     f"lags: must make the views agree, got ({cameras.list_lags(lags)}) frames "
                     f"where ({cameras.list_lags(best.frames)}) do: leave them out, or check them"
@@ -534,7 +534,7 @@ def _rig_warnings(
     """
     told, worst, where = f"({cameras.list_lags(best.frames)})", max(missed), ""
     few = worst <= cameras.GROSS
-    if _apart(lags, best, 0.02):  # by too little to refuse them
+    if _apart(lags, best, 0.02):  # frames, too few to refuse them
         if worst <= cameras.DISAGREEMENT:
             return [
                 "the lags that are given differ from those of the tracks: "
@@ -1034,9 +1034,9 @@ def _is_strange(track: Floats) -> bool:
     seen = np.isfinite(track).all(axis=1)
     steps, turns = (np.hypot(*np.diff(track, n, axis=0).T) for n in (1, 2))
     steps, turns = steps[np.isfinite(steps)], turns[np.isfinite(turns)]
-    if not len(turns) or seen.mean() < 0.5:
+    if not len(turns) or seen.mean() < 0.5:  # it may be of something else
         return True
-    # One step in fifty is a jump, of eight medians of all.
+    # More than one step in fifty is a jump, of eight times their median.
     jumps = np.mean(steps > 8.0 * max(np.median(steps), 1.0)) > 0.02
     still = np.ptp(track[seen], axis=0).max() < 2.0  # pixels
     return bool(jumps or still or np.median(turns) > np.median(steps))

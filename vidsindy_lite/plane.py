@@ -258,7 +258,7 @@ def _between(frames: Sequence[int], pixels: Floats, start: int) -> Floats:
     """A track that starts at some frame, not seen but from the first to the last of two frames."""
     first, last = check_vector("frames", frames, 2).tolist()
     number = start + np.arange(len(pixels))[:, None]
-    if not (first % 1 == last % 1 == 0 and number[0] <= first <= last - 5 <= number[-1] - 5):
+    if not (first % 1 == last % 1 == 0 and number[0] <= first and first + 5 <= last <= number[-1]):
         raise ValueError(
             "frames: must be the first and the last that count, at least 5 apart, integers from "
             f"{start} to {start + len(pixels) - 1}, got {first:g}, {last:g}"

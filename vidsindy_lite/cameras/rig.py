@@ -32,6 +32,7 @@ from __future__ import annotations
 
 import os
 import re
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import chain
@@ -85,7 +86,7 @@ GROSS = 4.0  #: Pixels; real calibrations of real tracks leave up to half of tha
 _FEWEST = 3  # cameras of which nothing is measured
 _MOST = 100  # cameras of a template
 _LOOKS = ("looks_at", "field_of_view", "roll")  # keys that a hand can measure
-_TEXTS = read_tree("rig", Path(__file__).with_suffix(".toml"), ".toml")
+_TEXTS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 _KEYS: dict[str, Any] = _TEXTS["keys"]
 _NAMES: dict[str, list[str]] = _KEYS["names"]
 # Keys that mark a camera as one to be left out: if they are set, or if they are not.
@@ -706,7 +707,7 @@ def _decomposed(table: dict[str, Any], name: str, warnings: list[str]) -> Iterat
         inner /= inner[2, 2]
         skew = abs(inner[0, 1] / inner[1, 1]) * size[1] / 2
         told = f"{skew:.3g} pixels at the edge of the image"
-        if skew > 5.0:
+        if skew > 5.0:  # pixels at the edge of the image, which are no camera's
             raise ValueError(f"P: must be of a camera with square corners, got a skew of {told}")
         if skew > ROUNDING:
             warnings.append(

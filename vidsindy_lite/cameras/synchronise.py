@@ -489,6 +489,7 @@ def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | No
                 (*_paired(mended, known.cameras), what, mended, known)
                 for what, mended, known in kind(given, rig, names)
             ]
+            # Of a kind those that mend most, with all cameras.
             tried = [
                 (_worst(fit), fit, what, mended, known)
                 for _, best, what, mended, known in sorted(ranked, key=itemgetter(0))[:16]

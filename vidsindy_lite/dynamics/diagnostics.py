@@ -665,7 +665,7 @@ def _rivals(
         )
     # From where the law begins to what is tolerated, each decade as likely.
     least = max(begins / path.own, 1.0)
-    sizes = np.geomspace(least, max(least, path.tolerated), 5)
+    sizes = np.unique(np.geomspace(least, max(least, path.tolerated), 5))
     yield from _far_neighbours(wider, sizes, remedy)
     origins = list(pinned(problem, fit.state, model, law, path.tolerated))
     if not tolerant:  # weaker errors than those tolerated say nothing about the law

@@ -662,7 +662,7 @@ def _smoothed(
     steps = typical_steps(trajectories)
     first = _stretches(trajectories, 5.0 * steps, unsure)
     smoothed = smooth([piece for _, piece in first], rng, penalties)
-    # Of the time scale of the motion, above which a pause is a gap.
+    # A pause is a gap if it is longer than this share of the time scale of the motion.
     longest = np.maximum(2.5 * steps, 0.4 / _rms_speed(smoothed.splines))
     stretches = _stretches(trajectories, longest, unsure)
     if [len(t) for _, (t, _) in stretches] != [len(t) for _, (t, _) in first]:

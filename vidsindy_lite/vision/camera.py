@@ -287,7 +287,7 @@ def _moved(before: Look, after: Look) -> bool | None:
         np.sum(np.linalg.norm(carry(here, a) - b, axis=1) < _STILL) for here in (rest, found.map)
     )
     moved = displacement(found.map[None], before.grey.shape[::-1])[0]
-    # Ten standard errors of a displacement are one.
+    # A displacement counts from ten of its standard errors on.
     return bool(moved > max(10 * found.error, _STILL) and stay <= 0.7 * share)
 
 
