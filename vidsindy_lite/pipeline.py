@@ -7,7 +7,7 @@ looks for the law that it obeys.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -274,8 +274,8 @@ def _observed(
             if far is not None:
                 tracks = replace(films, lags=far.lags.frames).aligned
                 warnings = (*far.lags.warnings, *doubts)
-                affine = _concluded(raw, tracks, far.rig, far.lags, clock, [], warnings, far.moving)
-                if far.moving < 3:  # what parallel projections see of a plane tells of no lens
+                affine = _concluded(raw, tracks, far.rig, far.lags, clock, [], warnings, far.places)
+                if len(far.variance) < 3:  # parallel projections of a plane tell of no lens
                     return affine
                 least = max(cameras.BETTER * far.lags.residual, cameras.DISAGREEMENT / 2)
                 most = min(least, cameras.GROSS)
@@ -328,18 +328,17 @@ def _concluded(
     clock: Clock,
     modes: Iterable[Floats],
     warnings: tuple[str, ...],
-    moving: int = 3,
+    places: Callable[[Sequence[Floats]], Floats] | None = None,
 ) -> Observation:
-    """The path that cameras have seen which are known now, along so many axes.
+    """The path that cameras have seen which are known now; by default as `cameras.reconstruct`.
 
     Its errors are the modes and what the tracks of all frames share.
     """
     motion = [_smoothed(clock.times, track) for track in tracks]
-    errors = np.stack([*modes, *cameras.tracking_errors(tracks, rig, motion, raw)])
-    moves = np.arange(3) < moving
-    x = cameras.reconstruct(tracks, rig) * moves
+    errors = np.stack([*modes, *cameras.tracking_errors(tracks, rig, motion, raw, places)])
+    x = cameras.reconstruct(tracks, rig) if places is None else places(tracks)
     rig = cameras.paced(rig, 1 / clock.rates)
-    return Observation(tracks, rig, lags, clock.times, x, errors * moves, warnings)
+    return Observation(tracks, rig, lags, clock.times, x, errors, warnings)
 
 
 def _several_observed(

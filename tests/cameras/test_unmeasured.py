@@ -164,7 +164,7 @@ def far_away(views=3, moving=3, noise=0.2, count=240, seed=0, lags=LAGS):
 def test_lags_and_axes_of_motion(views, moving):
     tracks, rig = far_away(views, moving)
     found = factorised(Footage.of(tracks), rig)
-    assert found.moving == moving
+    assert len(found.variance) == moving
     np.testing.assert_allclose(found.lags.frames, LAGS[:views], atol=0.1)
     assert (found.lags.errors[1:] < 0.05).all()
     assert found.lags.residual < 0.3
@@ -210,6 +210,20 @@ def test_views_with_nothing_in_common_and_what_stands_still_tell_nothing():
     for synchronous in (False, True):
         assert factorised(Footage.of(tracks), rig, synchronous) is None
     assert factorised(Footage.of([np.ones_like(track) for track in tracks]), rig) is None
+
+
+def test_what_two_views_alike_cannot_tell_is_no_more_than_the_spread_of_the_path():
+    rng, x = np.random.default_rng(3), swinging(np.arange(200))
+    one, other = rng.normal(size=(2, 2, 3))
+    each = one, one + 0.01 * rng.normal(size=(2, 3)), other
+    tracks = [100 + x @ axes.T + 0.3 * rng.normal(size=(200, 2)) for axes in each]
+    tracks[2][120:] = np.nan
+    found = factorised(Footage.of(tracks, [0.0] * 3), far_away()[1], synchronous=True)
+    places, known = found.places(tracks), np.column_stack([np.ones(200), x])
+    off = places - known @ np.linalg.lstsq(known[:120], places[:120], rcond=None)[0]
+    assert (off[:120].std(axis=0) < 0.5).all()
+    assert (off[120:].std(axis=0) < 1.5 * places[:120].std(axis=0)).all()
+    assert off[120:].std() < 0.2 * vl.reconstruct(tracks, found.rig)[120:].std()
 
 
 def test_the_law_of_a_swing_needs_no_rig():

@@ -23,7 +23,8 @@ Paper: Section "Coordinates Transformation", Eq. (4), (5).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -42,7 +43,7 @@ from .models import (
     intersect,
     missed,
 )
-from .rig import Rig, check_calibrated, check_seen, check_views
+from .rig import Rig, check_calibrated, check_seen, check_views, reconstruct
 from .unmeasured import posed
 
 
@@ -430,6 +431,7 @@ def tracking_errors(
     rig: Rig,
     motion: Sequence[Floats] | None = None,
     raw: Sequence[Floats] | None = None,
+    places: Callable[[Sequence[Floats]], Floats] | None = None,
 ) -> Floats:
     """Errors of the reconstructed path that the tracks of all frames share.
 
@@ -449,6 +451,8 @@ def tracking_errors(
         The tracks without their noise; by default the tracks themselves.
     raw : sequence of ndarray, shape (n_i, 2), optional
         The tracks as they were before they were interpolated to these instants, if they were.
+    places : callable, optional
+        From tracks to the path; by default that of `reconstruct`.
 
     Returns
     -------
@@ -466,7 +470,8 @@ def tracking_errors(
     views = check_views(tracks, rig)
     if len(views[0]) < 2:
         raise ValueError(f"tracks: must have two frames or more, got {[*map(len, views)]}")
-    x, _ = intersect(rig.cameras, views)
+    if places is None:
+        places = partial(reconstruct, rig=rig)
     left = np.hstack(missed(rig.cameras, views))
     count = left.shape[1]
     left = np.abs(left[np.isfinite(left)])
@@ -482,7 +487,8 @@ def tracking_errors(
         place = _step(track) / np.sqrt(12)  # of what lies anywhere in a step with equal chance
         shifts += [(i, place * axis) for axis in np.eye(2) if place]
     moved = ([*views[:i], views[i] + shift, *views[i + 1 :]] for i, shift in shifts)
-    return np.nan_to_num([intersect(rig.cameras, those)[0] - x for those in moved])
+    x = places(views)
+    return np.nan_to_num([places(those) - x for those in moved])
 
 
 def _step(track: Floats) -> float:

@@ -40,7 +40,7 @@ from scipy.optimize import least_squares
 from ..arrays import Floats
 from .adjust import PARTS, Adjustment, adjust, known_to, lasting
 from .clocks import OVERLAP, Footage, Lags, dips, untold_lags
-from .models import AffineCamera, PerspectiveCamera, at_once, missed
+from .models import ROUNDING, AffineCamera, PerspectiveCamera, at_once, missed
 from .rig import ALIKE, BETTER, FINE, GROSS, Rig, check_views
 
 _FEWEST = 8  # frames in common of a pair
@@ -270,11 +270,34 @@ def _note(rig: Rig) -> str:
 
 
 class Factorised(NamedTuple):
-    """Cameras of one affine frame, when their videos began, and along how many axes it moves."""
+    """Cameras of one affine frame, when their videos began, and the path's variance along its axes.
+
+    That is in units of the noise of a pixel; of the first axes alone, if it moves along these.
+    """
 
     rig: Rig
     lags: Lags
-    moving: int
+    variance: Floats
+
+    def places(self, tracks: Sequence[Floats]) -> Floats:
+        """The path, (n, 3), that is likeliest where its images and its spread are known.
+
+        Two views may tell hardly anything of one direction (probabilistic principal components,
+        Tipping and Bishop 1999). NaN where fewer than two see the target.
+        """
+        moving, count = len(self.variance), len(tracks)
+        origin, *ends = (
+            np.hstack([camera.image(point[None]) for camera in self.rig.cameras])
+            for point in np.eye(4, 3, k=-1)[: moving + 1]
+        )
+        axes, pixels = np.concatenate(ends) - origin, np.hstack(tracks)
+        seen = np.isfinite(pixels)
+        information = np.einsum("ij,nj,kj->nik", axes, seen, axes) + np.diag(1 / self.variance)
+        pull = np.where(seen, pixels - origin, 0.0) @ axes.T
+        x = np.zeros((len(pixels), 3))
+        x[:, :moving] = np.linalg.solve(information, pull[..., None])[..., 0]
+        x[seen.reshape(-1, count, 2).all(axis=2).sum(axis=1) < 2] = np.nan
+        return x
 
 
 def factorised(films: Footage, rig: Rig, synchronous: bool = False) -> Factorised | None:
@@ -306,10 +329,11 @@ def factorised(films: Footage, rig: Rig, synchronous: bool = False) -> Factorise
     # Times what is left by which a target must move, rms, in every view.
     if not (moved > 5.0**2 * missed).all():
         return None
-    middle, _, axes = _spread(images)
+    middle, sizes, axes = _spread(images)
+    seen = np.isfinite(images).all(axis=1).sum()
     downs = np.split(np.sqrt(count) * axes[:3].T, count)
-    places, sizes = np.split(middle, count), [camera.image_size for camera in rig.cameras]
-    cameras = tuple(map(AffineCamera.of, downs, places, sizes))
+    places, shapes = np.split(middle, count), [camera.image_size for camera in rig.cameras]
+    cameras = tuple(map(AffineCamera.of, downs, places, shapes))
     doubts = []
     if left > GROSS:
         doubts.append(
@@ -318,7 +342,8 @@ def factorised(films: Footage, rig: Rig, synchronous: bool = False) -> Factorise
     if others and rank > 1:  # on a line the motion is the same, whole periods apart
         doubts.append(untold_lags([best, *others]))
     told = Lags(best, films.rates, errors, left, tuple(doubts), clocks=films.uneven)
-    return Factorised(Rig(cameras, note=_NOTE), told, rank)
+    variance = sizes[:rank] ** 2 / (seen * count * max(left, ROUNDING) ** 2)
+    return Factorised(Rig(cameras, note=_NOTE), told, variance)
 
 
 def _least(footage: Footage) -> float:
