@@ -209,8 +209,14 @@ save_figure("projection_near_z", fig, caption=caption, numbers={"tilt": tilt, **
 # the proof of the appendix, without expanding a single product. It needs *normal to* $\mathbf e_z$.
 
 # %%
+def foot(x, n, d):
+    """Of the perpendicular from points x to the plane n . x + d = 0 (Eq. S3)."""
+    return x - np.multiply.outer((x @ n + d) / (n @ n), n)
+
+
 d = np.linspace(-80, 80, 41)
-feet = np.array([cameras.plane_projection(x[0], n, value) for value in d])
+feet = np.array([foot(x[0], n, value) for value in d])
+assert np.allclose(feet @ n + d, 0, atol=1e-12)
 turned = {"R takes n to $e_z$": feet @ R.T, "as in the text: $e_z$ to n": feet @ text.T}
 spread = [np.ptp(values[:, :2], axis=0).max() for values in turned.values()]
 assert spread[0] < 1e-12
@@ -286,15 +292,21 @@ assert abs(coefficient_of_d(np.cross(e_z, n))) > 0.1
 # names X'OY', the image plane itself, whose distance is the depth. And the distances carry a *sign*.
 
 # %%
+def signed_distance(x, p1, p2, p3):
+    """Of x to the plane through three points, positive where they are seen counter-clockwise."""
+    normal = np.cross(p2 - p1, p3 - p1)
+    return normal @ (x - p1) / np.linalg.norm(normal)
+
+
 X, Y, Z = R
 origin, C = np.zeros(3), camera.position
 distance = {
-    "Y'OZ' (delta_x)": cameras.signed_distance(C, *cameras.plane_through(origin, Y, Z)),
-    "X'OZ' (delta_y)": cameras.signed_distance(C, *cameras.plane_through(origin, Z, X)),
-    "X'OY' (depth)": cameras.signed_distance(C, *cameras.plane_through(origin, X, Y)),
+    "Y'OZ' (delta_x)": signed_distance(C, origin, Y, Z),
+    "X'OZ' (delta_y)": signed_distance(C, origin, Z, X),
+    "X'OY' (depth)": signed_distance(C, origin, X, Y),
 }
 assert np.allclose(list(distance.values())[:2], camera.offset, atol=1e-12)
-behind = cameras.signed_distance(-C, *cameras.plane_through(origin, Y, Z))  # on its other side
+behind = signed_distance(-C, origin, Y, Z)  # on its other side
 assert np.isclose(behind, -distance["Y'OZ' (delta_x)"])
 
 # %%
@@ -337,7 +349,7 @@ save_figure("projection_offset_signs", fig, caption=caption, numbers=curves)
 
 # %%
 pixels = camera.project(x)
-on_plane = cameras.plane_projection(x, camera.normal, -camera.normal @ camera.position)
+on_plane = foot(x, camera.normal, -camera.normal @ camera.position)
 assert np.allclose(camera.project(on_plane), pixels, atol=1e-9)
 assert np.allclose(camera.plane_coordinates(pixels), seen, atol=1e-9)
 print("pixels from", pixels.min(axis=0).round(1), "to", pixels.max(axis=0).round(1))

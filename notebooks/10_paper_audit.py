@@ -189,10 +189,7 @@ with np.errstate(invalid="ignore"):
     axis = np.cross(e_z, e_z) / np.linalg.norm(np.cross(e_z, e_z))
 assert np.isnan(axis).all()
 offsets = np.array([camera.offset for camera in rig.cameras])
-signed = np.array([
-    [cameras.signed_distance(c.position, row, 0.0) for row in cameras.rotation_to_z(c.normal)]
-    for c in rig.cameras
-])  # fmt: skip
+signed = np.array([cameras.rotation_to_z(c.normal) @ c.position for c in rig.cameras])
 assert np.allclose(signed[:, :2], offsets, atol=1e-12)
 assert not np.allclose(np.abs(signed[:, [1, 2]]), np.abs(offsets), atol=1)
 

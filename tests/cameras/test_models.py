@@ -15,11 +15,8 @@ from scipy.spatial.transform import Rotation
 from vidsindy_lite.cameras import OrthographicCamera, PerspectiveCamera, Rig
 from vidsindy_lite.cameras.models import (
     distorted,
-    plane_projection,
-    plane_through,
     rodrigues,
     rotation_to_z,
-    signed_distance,
     undistorted,
 )
 
@@ -57,8 +54,6 @@ def test_depth_is_not_seen():
     for camera, track in zip(rig.cameras, tracks, strict=True):
         seen = camera.plane_coordinates(track)
         np.testing.assert_allclose(seen, x @ camera.rows.T, atol=1e-10 * np.abs(x).max())
-        on_plane = plane_projection(x, camera.normal, -camera.normal @ camera.position)
-        np.testing.assert_allclose(camera.project(on_plane), track, atol=1e-9)
         nearer = replace(camera, position=camera.position + 3 * camera.normal)
         np.testing.assert_allclose(nearer.project(x), track, atol=1e-9)
 
@@ -154,33 +149,6 @@ def test_rotation_to_z_at_and_near_the_z_axis():
         np.testing.assert_allclose(rotation @ (normal / np.linalg.norm(normal)), E_Z, atol=1e-14)
 
 
-@given(vectors(100.0), directions(), st.floats(-100, 100))
-def test_projection_is_the_nearest_point_of_the_plane(x, normal, d):
-    foot = plane_projection(x, normal, d)
-    length = np.linalg.norm(normal)
-    assert normal @ foot + d == pytest.approx(0, abs=1e-10)
-    np.testing.assert_allclose(np.cross(x - foot, normal / length), 0, atol=1e-10 / length)
-    np.testing.assert_allclose(plane_projection(foot, normal, d), foot, atol=1e-10 / length)
-
-
-def test_planes_and_distances_by_hand():
-    normal, d = plane_through((1, 0, 2), (0, 1, 2), (-1, -1, 2))
-    np.testing.assert_allclose(normal, E_Z, atol=1e-15)
-    assert d == pytest.approx(-2)
-    projected = plane_projection([[np.nan] * 3, [1.0, 2.0, 3.0]], (0, 0, 1), 0)
-    np.testing.assert_array_equal(projected, [[np.nan] * 3, [1, 2, 0]])
-    # A distance does not depend on the length of the equation; a small triangle is a plane.
-    x = np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]])
-    np.testing.assert_allclose(signed_distance(x, (0, 0, 2), -4), [1, -2])
-    np.testing.assert_allclose(signed_distance(x, (0, 0, -2), 4), [-1, 2])
-    normal, d = plane_through((1e6, 0, 0), (1e6, 1e-6, 0), (1e6, 0, 1e-6))
-    np.testing.assert_allclose(normal, [1, 0, 0], atol=1e-15)
-    assert d == pytest.approx(-1e6)
-    for size in (1e-6, 1e6):
-        with pytest.raises(ValueError, match="must not lie on one line"):
-            plane_through((0, 0, 0), (size, size, 0), (3 * size, 3 * size, 1e-13 * size))
-
-
 UNKNOWN = PerspectiveCamera(position=(0, 0, 1), normal=(0, 0, 1))
 AT_REST = OrthographicCamera(position=(0, 0, 0), normal=(0, 0, 1), scale=1, angle=0)
 
@@ -196,8 +164,6 @@ AT_REST = OrthographicCamera(position=(0, 0, 0), normal=(0, 0, 1), scale=1, angl
         (lambda: UNKNOWN.focal_length, "scale and angle must be known"),
         (lambda: rotation_to_z([0, 0, 0]), "normal: must not be the zero vector, got"),
         (lambda: rodrigues([0, 0, 0], 1.0), "axis: must not be the zero vector, got"),
-        (lambda: plane_projection([1, 2], [0, 0, 1], 0), r"x: must have shape \(\.\.\., 3\), got"),
-        (lambda: plane_through((0, 0, 0), (1, 1, 1), (2, 2, 2)), "must not lie on one line"),
     ],
 )
 def test_bad_input(call, message):

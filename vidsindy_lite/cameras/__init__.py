@@ -19,7 +19,7 @@ from .calibrate import calibration_errors, check_learnable, learn_cameras, learn
 from .calibrate import systematic_errors, tracking_errors
 from .clocks import Clock, Footage, Lags, align, list_lags
 from .models import AffineCamera, Camera, OrthographicCamera, PerspectiveCamera
-from .models import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance
+from .models import rodrigues, rotation_to_z
 from .rig import BETTER, DISAGREEMENT, GROSS, Rig, disagreement, paced, read_calibration
 from .rig import reconstruct, residuals, rig_template
 from .synchronise import find_mistake, learn_lags
