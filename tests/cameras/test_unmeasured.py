@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import aligned_error, far_off, room, shot, walk
+from helpers import aligned_error, far_off, real, room, shot, walk
 
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import AffineCamera, Footage, factorised, learn_cameras_eq4, posed
@@ -236,6 +236,14 @@ def test_the_law_of_a_swing_needs_no_rig():
         assert period.error < 0.02 * true
     assert "frequencies and dampings" in found.rig.note
     assert max(np.nanstd(missed) for missed in found.residuals) < 0.3
+
+
+@pytest.mark.thorough  # three films, two minutes
+def test_three_telephones_of_which_nothing_is_known():
+    hints = [None, None, vl.Hint(frame=0, box=(68, 38, 70, 82))]
+    found = vl.discover_from_videos([real(f"can_{i}") for i in (1, 2, 3)], hints=hints)
+    assert abs(found.period.value - 40.2 / 30) < 3 * found.period.error
+    assert found.period.error < 0.02 * found.period.value
 
 
 def test_affine_cameras_see_what_their_axes_say_and_have_a_file(tmp_path):
