@@ -86,12 +86,33 @@ def test_each_trajectory_has_its_input_and_a_gap_is_bridged():
     assert np.isfinite(found.curve(np.concatenate([T, later]))).all()
 
 
+def test_an_input_that_the_law_does_not_have_changes_no_physics():
+    x = np.exp(-0.05 * T) * np.cos(2 * T)
+    found = vl.discover(T, noisy(x[:, None], 0.01), library=Library.polynomial(1) + U, order=2)
+    assert terms(found.system, "vx") == {"x", "vx"}
+    assert found.physics()["period"].value == pytest.approx(np.pi, abs=0.01)
+    assert "and never rises" in str(found.physics())
+
+
+@pytest.mark.parametrize("rate", [1.3j, -0.65 + 1.89j])  # of what drives it, or of its control
+def test_an_input_that_follows_from_the_state_is_told(rate):
+    t = np.linspace(0, 10, 800)
+    x, v = np.real(np.exp(rate * t)), np.real(rate * np.exp(rate * t))
+    u = 3 * x + 0.5 * v
+    library = Library.polynomial(1) + Library.inputs(t, {"u": u})
+    found = vl.discover(t, noisy(x[:, None], 0.01), library=library, order=2)
+    assert any("x, vx, u depend on each other" in doubt for doubt in found.warnings)
+
+
 def test_a_law_with_an_input_is_saved_and_read_with_its_library(forced, tmp_path):
     forced.save(tmp_path / "law.json")
     again = Discovery.load(tmp_path / "law.json", CUBIC + U)
     state = np.array([0.1, 0.2, 3.0])  # the time is the last
     assert again.predict(state)[1] == forced.predict(state)[1]
-    assert "changes with the time" in str(again.physics())
+    said = again.physics()  # of the same law without what drives it
+    assert said["natural frequency"].value == pytest.approx(np.sqrt(2), abs=0.01)
+    assert "changes with the time" in str(said)
+    assert not said.energy
     with pytest.raises(ValueError, match="library: must hold the function 'u'"):
         Discovery.load(tmp_path / "law.json")
     with pytest.raises(ValueError, match=r"t: must lie where u is known, got 42"):

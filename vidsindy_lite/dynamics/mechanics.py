@@ -140,10 +140,14 @@ def physics_of(
         down = down / np.linalg.norm(down)
     if law.order == 1:
         return Physics((), (), ("a law of first order holds no forces: order=2 looks for them",))
+    driven = ""
     if law.timed:
-        return Physics((), (), ("a force changes with the time: no energy and no place of rest",))
+        whole = law.support.sum()
+        law, covariance = _without_time(law, covariance)
+        if law.support.sum() < whole - 1:  # the time itself has a term, too
+            driven = "a force changes with the time: what is said holds without it; no energy"
     times = [np.linspace(curve.t[0], curve.t[-1], POINTS) for curve in curves]
-    paths = [curve(t) for curve, t in zip(curves, times, strict=True)]
+    paths = [curve(t)[:, : law.d] for curve, t in zip(curves, times, strict=True)]
     body = _Body(law, covariance, np.concatenate(paths))
     rest = None
     if not body.force(law, body.states)[1].any():
@@ -155,12 +159,29 @@ def physics_of(
             "nothing holds it at a place near the motion, or a force jumps there: no spring "
             "constants and no periods"
         ]
-    energy = body.energies(times, paths, rest)
+    energy = [] if driven else body.energies(times, paths, rest)
     return Physics(
         quantities=tuple(entry for entry in said if isinstance(entry, Quantity)),
         energy=tuple(energy),
-        notes=(*(entry for entry in said if isinstance(entry, str)), _balance(energy, paths)),
+        notes=(
+            *(entry for entry in said if isinstance(entry, str)),
+            driven or _balance(energy, paths),
+        ),
     )
+
+
+def _without_time(law: PolynomialSystem, covariance: Floats) -> tuple[PolynomialSystem, Floats]:
+    """The terms of a law that do not hold the time, its last variable, as a law of the others."""
+    d, (l, width) = law.d, law.exponents.shape
+    timely = [d - 1, *(d + k for k, function in enumerate(law.functions) if function.of_time)]
+    timely += [width - 1] if width > d + len(law.functions) else []  # the slope of the time
+    rows = np.flatnonzero(~law.exponents[:, timely].any(axis=1))
+    calm = PolynomialSystem(
+        law.names[:-1], np.delete(law.exponents[rows], timely, axis=1), law.coefficients[rows, :-1],
+        functions=tuple(function for function in law.functions if not function.of_time),
+    )  # fmt: skip
+    kept = (np.arange(d - 1)[:, None] * l + rows).ravel()
+    return calm, covariance[np.ix_(kept, kept)]
 
 
 @dataclass(frozen=True, eq=False)

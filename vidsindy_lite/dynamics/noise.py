@@ -304,7 +304,8 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     # What is known of a law (the slope of a position is the velocity) holds exactly.
     physics = np.where(free, 1.0, FINAL_WEIGHT) * start.physics_weights
     kicked = _balanced(problem, replace(start, physics_weights=physics), every, rng)
-    if like_kicks(kicked, free, rng) < 0.01:
+    met = np.isfinite(kicked.collocation.objective(kicked.state))  # else it has a pole on its path
+    if not met or like_kicks(kicked, free, rng) < 0.01:
         return None
     exact = _measured_badly(problem, fit, segments)
     if not evidence(kicked) < evidence(exact) + prediction_gain(exact).sum():
@@ -381,7 +382,7 @@ def _balanced(
         unknown = (collocation.counts > 0) & (not told)
         data = np.where(unknown, data, collocation.data_weights)
         law = np.where(free, law, collocation.physics_weights)
-        data, law = np.minimum(data, CLEANEST**-2), np.minimum(law, hardest)
+        data, law = np.minimum(data, CLEANEST**-2), np.clip(law, LEAST, hardest)
         change = np.log([data / collocation.data_weights, law / collocation.physics_weights])
         collocation = replace(collocation, data_weights=data, physics_weights=law)
         if (np.abs(change) < 0.1).all():

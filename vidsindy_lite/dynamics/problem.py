@@ -645,7 +645,7 @@ def _check_independent(form: Form, terms: Floats) -> None:
         if len(terms) >= len(sizes) and sizes[-1] < 1e-10 * sizes[0]:  # as far as rounding tells
             names = np.array(form.law(form.known).terms)[unknowns % l]
             raise ValueError(
-                "library: its terms must not depend on each other, got "
+                "library: its terms must not be zero or depend on each other on the data, got "
                 + ", ".join(dict.fromkeys(names[np.abs(shares[-1]) > 1e-3]))
             )
 
