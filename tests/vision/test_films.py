@@ -95,6 +95,21 @@ def test_a_colour_that_the_film_shows_mixed_with_its_ground_is_not_lost(tmp_path
         assert any("colour (230, 40, 110)" in doubt for doubt in lost.warnings)
 
 
+@pytest.mark.parametrize("plain", [True, False])
+def test_a_bob_is_told_from_its_string(tmp_path, plain):
+    ground = np.full((200, 240, 3), 178.0) if plain else texture(np.random.default_rng(4), 240, 200)
+    swing = 0.6 * np.cos(2 * ANGLE)
+    truth = [120, 10] + 150 * np.column_stack([np.sin(swing), np.cos(swing)])
+
+    def draw(image, i):
+        ends = (np.rint(16 * np.array(end)).astype(int) for end in ([120, 10], truth[i]))
+        cv2.line(image, *map(tuple, ends), (60, 60, 60), 2, cv2.LINE_AA, 4)
+        return disc(image, truth[i], 9, (210, 60, 30))
+
+    _, error = followed(painted(tmp_path, ground, draw, N), truth, least=0.9)
+    assert np.nanmax(error) < 2
+
+
 SIZE = 200, 150
 LENGTH = 60
 BALL = 6

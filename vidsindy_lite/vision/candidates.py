@@ -233,9 +233,10 @@ def candidates(
         if others:
             witnesses.append((_from_neighbours(frame, others, plate.moves) / allowed, 0.7))
         one = _distinct(Candidates.joined(
-            components(strength, level, frame, ground, worth)
+            components(strength, level, frame, ground, worth, without_thin)
             for strength, worth in witnesses
             for level in (1.0, 2.5, 6.0)  # tolerances by which what is connected differs
+            for without_thin in (False, True)
         ))  # fmt: skip
         found.append(one._replace(frame=one.frame + i, place=carry(here, one.centre),
                                   colour=one.colour / lit))  # fmt: skip
@@ -270,9 +271,21 @@ def _from_neighbours(frame: Image, others: list[tuple[Image, Floats]], moves: bo
     return least
 
 
+def solid(mask: NDArray[Any]) -> Image:
+    """A mask, (h, w), without strings: what hangs on a part, up to half as wide and five pixels."""
+    inside = cv2.distanceTransform(np.pad(mask, 1), cv2.DIST_L2, 5)[1:-1, 1:-1]
+    labels = np.asarray(cv2.connectedComponents(mask)[1], np.int64)
+    widest, shown = np.zeros(labels.max() + 1, np.float32), mask > 0
+    np.maximum.at(widest, labels[shown], inside[shown])
+    half = np.minimum(0.5 * widest, 2.5)[labels]
+    beyond = cv2.distanceTransform((inside <= half).astype(np.uint8), cv2.DIST_L2, 5)
+    return np.asarray(shown & (beyond <= half), np.uint8)
+
+
 def components(
-    strength: Floats32, level: float, frame: Image, ground: Image, worth: float = 1.0
-) -> Candidates:
+    strength: Floats32, level: float, frame: Image, ground: Image, worth: float = 1.0,
+    without_thin: bool = False,
+) -> Candidates:  # fmt: skip
     """What differs by some level and is connected, in a frame that counts as the first one.
 
     A thing is plain if it differs by much, fills its box, is of more than a few pixels and lies
@@ -281,8 +294,9 @@ def components(
     mask = cv2.morphologyEx((strength > level).astype(np.uint8), cv2.MORPH_CLOSE,
                             np.ones((3, 3), np.uint8))  # fmt: skip
     left, top, wide, high = cv2.boundingRect(mask)
-    place = np.s_[top : top + max(high, 1), left : left + max(wide, 1)]
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask[place])
+    shown = mask[top : top + max(high, 1), left : left + max(wide, 1)]
+    shown = solid(shown) if without_thin else shown
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(shown)
     area = stats[:, cv2.CC_STAT_AREA].astype(float)
     order = 1 + np.argsort(-area[1:])[:_KEPT]  # the largest: the others are noise
     order = order[(area[order] >= 3) & (area[order] <= 0.3 * mask.size)]
