@@ -235,6 +235,9 @@ def test_a_swing_is_on_a_circle(monkeypatch, samples, drag):
     assert abs(found.g.value - 9.81) < 2 * found.g.error < 0.6
     assert float(found.period.value) == pytest.approx(2 * np.pi / np.sqrt(9.81 / 0.5), rel=2e-3)
     np.testing.assert_allclose(found.fitted, found.x, atol=2e-3)
+    filmed(monkeypatch, pixels_of(noisy(x, 0))[::-1])
+    found = vl.discover_from_video("backwards.mp4", (600, 430, 600, 305, 0.5))
+    assert any("the film may run backwards" in doubt for doubt in found.warnings)
 
 
 def test_a_wheel_turns_by_the_law_of_its_angle(monkeypatch):
