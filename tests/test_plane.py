@@ -1,6 +1,7 @@
 """One camera, motion in a plane: the scale and its error, and laws that are the same everywhere."""
 
 import json
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -238,6 +239,21 @@ def test_a_swing_is_on_a_circle(monkeypatch, samples, drag):
     filmed(monkeypatch, pixels_of(noisy(x, 0))[::-1])
     found = vl.discover_from_video("backwards.mp4", (600, 430, 600, 305, 0.5))
     assert any("the film may run backwards" in doubt for doubt in found.warnings)
+
+
+@pytest.mark.parametrize("kind", ["swing", "fall"])
+def test_what_is_held_before_it_moves_does_not_count(monkeypatch, kind):
+    t = np.arange(100) / 30
+    moved = swung(t, 0.5, 0.1) if kind == "swing" else flight((0, 0), samples=20)[1]
+    filmed(monkeypatch, pixels_of(noisy(np.concatenate([moved[:1].repeat(25, axis=0), moved]), 0)))
+    found = vl.discover_from_video("held.mp4", STICK)
+    assert found.status == "ok"
+    assert abs(found.g.value - 9.81) < 3 * found.g.error < 2
+    assert re.search(r"it rests until frame 2[4-7]: counted from (2[6-9]|3\d) on", found.rig.note)
+    every = vl.discover_from_video("held.mp4", STICK, frames=(0, len(moved) + 24))
+    assert np.isfinite(every.x).all()
+    filmed(monkeypatch, pixels_of(noisy(moved, 0)))  # let go as the film begins
+    assert "rests" not in vl.discover_from_video("free.mp4", STICK).rig.note
 
 
 def test_a_wheel_turns_by_the_law_of_its_angle(monkeypatch):

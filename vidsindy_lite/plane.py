@@ -195,7 +195,8 @@ def discover_from_video(
         pixels = _between(frames, pixels, first)
     check_found([pixels], [name], 1)
     pixels, left_out = without_wild(pixels, name)
-    rig = noted(rig, left_out)
+    pixels, held = _let_go(pixels, first) if frames is None else (pixels, "")
+    rig = noted(rig, left_out, held)
     x = mapped(to_plane, pixels)
     known = slice(3 if corners is None else 1) if measured else slice(0)
     modes = np.stack([error * x, *_tilts(camera, pixels, middle)])[known]
@@ -264,6 +265,23 @@ def _between(frames: Sequence[int], pixels: Floats, start: int) -> Floats:
             f"{start} to {start + len(pixels) - 1}, got {first:g}, {last:g}"
         )
     return np.where((number >= first) & (number <= last), pixels, np.nan)
+
+
+def _let_go(pixels: Floats, start: int) -> tuple[Floats, str]:
+    """A track that starts at some frame, without the rest before its motion, and what to say of it.
+
+    From rest, in twice the time it moves four times as far: so it was let go as long before it had
+    moved by one step as that is before four.
+    """
+    seen = np.flatnonzero(np.isfinite(pixels).all(axis=1))
+    apart = np.linalg.norm(pixels[seen] - np.median(pixels[seen[:5]], axis=0), axis=1)
+    step = max(0.02 * apart.max(), 2.0)  # pixels, more than a track errs
+    once, fourth = (seen[int((apart > far).argmax())] for far in (step, 4 * step))
+    released = 2 * once - fourth
+    if apart.max() <= 4 * step or released < seen[0] + 5:
+        return pixels, ""
+    told = f"it rests until frame {start + released}: counted from {start + once} on"
+    return np.where(np.arange(len(pixels))[:, None] < once, np.nan, pixels), told
 
 
 def four_places(
