@@ -136,7 +136,7 @@ def discover_from_video(
         marks, a pixel each, comes on top.
     frames : (first, last), optional
         What counts of the film, from 0 and both included: the target may be in a hand before, or on
-        the ground after that.
+        the ground after that. By default all but the rest of what is held still and then let go.
     individual : str, optional
         Which of several targets of a text file; see `read_tracks`.
     hint, detector
