@@ -1,5 +1,7 @@
 """What tracks tell of a path with lags that are given, and what is wrong where they tell none."""
 
+import json
+
 import numpy as np
 import pytest
 from helpers import by_hand, room
@@ -9,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
 from vidsindy_lite import cameras, study
+from vidsindy_lite.companion.report import write_report
 from vidsindy_lite.pipeline import Refused, refusing, without_wild
 
 
@@ -267,3 +270,26 @@ def test_tracks_of_which_nothing_can_be_learned_come_with_the_refusal(case):
     thirds = [np.where(np.arange(150)[:, None] // 50 == i, t, np.nan) for i, t in enumerate(tracks)]
     with pytest.raises(Refused, match="do two views share frames"):
         vl.observe_tracks(thirds, rig, np.arange(150))
+
+
+SPRINGS = vl.PolynomialSystem.from_terms(
+    {
+        "x": {"vx": 1}, "y": {"vy": 1}, "z": {"vz": 1},
+        "vx": {"x": -30, "vx": -0.25}, "vy": {"y": -34, "vy": -0.25}, "vz": {"z": -40, "vz": -0.25},
+    }
+)  # fmt: skip
+
+
+def test_the_stiffness_of_three_springs_and_a_report_on_accelerations(tmp_path):
+    x = SPRINGS.simulate(np.arange(240) / 30, [0.5, 0.2, -0.1, 0, 1, 0.7])[:, :3]
+    rig, rng = vl.Rig.around(x, (512, 512)), np.random.default_rng(0)
+    tracks = [c.project(x) + 0.1 * rng.normal(size=(240, 2)) for c in rig.cameras]
+    found = vl.discover_from_tracks(tracks, rig, fps=30, degree=2, order=2)
+    law = found.discovery.system.text(2)
+    assert law == "x'' = -30 x - 0.25 vx\ny'' = -34 y - 0.25 vy\nz'' = -40 z - 0.25 vz"
+    assert found.status == "ok", found.warnings
+    write_report(found, None, tmp_path / "report", {})
+    written = json.loads((tmp_path / "report" / "result.json").read_text())
+    equations = [term["equation"] for term in written["law"]["data"]["terms"]]
+    assert equations == ["x''", "x''", "y''", "y''", "z''", "z''"]
+    assert "\nperiod x = 1.147" in (tmp_path / "report" / "report.html").read_text()

@@ -223,7 +223,6 @@ def test_what_two_views_alike_cannot_tell_is_no_more_than_the_spread_of_the_path
     off = places - known @ np.linalg.lstsq(known[:120], places[:120], rcond=None)[0]
     assert (off[:120].std(axis=0) < 0.5).all()
     assert (off[120:].std(axis=0) < 1.5 * places[:120].std(axis=0)).all()
-    assert off[120:].std() < 0.2 * vl.reconstruct(tracks, found.rig)[120:].std()
 
 
 def test_the_law_of_a_swing_needs_no_rig():

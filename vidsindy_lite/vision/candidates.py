@@ -217,9 +217,13 @@ class Candidates(NamedTuple):
 
 
 def candidates(
-    frames: Iterable[Image], maps: Floats, plate: Plate, noise: float, targets: int
-) -> tuple[Candidates, list[Floats32]]:
-    """The candidates of all frames, and how much brighter each frame is than the ground."""
+    frames: Iterable[Image], maps: Floats, plate: Plate, noise: float, targets: int,
+    bare: bool = False,
+) -> tuple[Candidates, list[Floats32]]:  # fmt: skip
+    """The candidates of all frames, and how much brighter each frame is than the ground.
+
+    If `bare`, those on which a string hangs without it, too.
+    """
     lights, found = [], []
     bound = tolerance(plate.image, least_difference(noise), moves=plate.moves)
     bound[plate.valid == 0] = 1e3
@@ -233,10 +237,10 @@ def candidates(
         if others:
             witnesses.append((_from_neighbours(frame, others, plate.moves) / allowed, 0.7))
         one = _distinct(Candidates.joined(
-            components(strength, level, frame, ground, worth, without_thin)
+            components(strength, level, frame, ground, worth, thin)
             for strength, worth in witnesses
             for level in (1.0, 2.5, 6.0)  # tolerances by which what is connected differs
-            for without_thin in (False, True)
+            for thin in (True, False)[: 1 + bare]
         ))  # fmt: skip
         found.append(one._replace(frame=one.frame + i, place=carry(here, one.centre),
                                   colour=one.colour / lit))  # fmt: skip
@@ -271,20 +275,20 @@ def _from_neighbours(frame: Image, others: list[tuple[Image, Floats]], moves: bo
     return least
 
 
-def solid(mask: NDArray[Any]) -> Image:
-    """A mask, (h, w), without strings: what hangs on a part, up to half as wide and five pixels."""
+def without_strings(mask: NDArray[Any]) -> Image:
+    """A mask, (h, w), without what hangs on its parts, up to half as wide and five pixels."""
     inside = cv2.distanceTransform(np.pad(mask, 1), cv2.DIST_L2, 5)[1:-1, 1:-1]
     labels = np.asarray(cv2.connectedComponents(mask)[1], np.int64)
-    widest, shown = np.zeros(labels.max() + 1, np.float32), mask > 0
-    np.maximum.at(widest, labels[shown], inside[shown])
+    widest = np.zeros(labels.max() + 1, np.float32)
+    np.maximum.at(widest, labels[mask > 0], inside[mask > 0])
     half = np.minimum(0.5 * widest, 2.5)[labels]
     beyond = cv2.distanceTransform((inside <= half).astype(np.uint8), cv2.DIST_L2, 5)
-    return np.asarray(shown & (beyond <= half), np.uint8)
+    return np.asarray((mask > 0) & (beyond <= half), np.uint8)
 
 
 def components(
     strength: Floats32, level: float, frame: Image, ground: Image, worth: float = 1.0,
-    without_thin: bool = False,
+    thin: bool = True,
 ) -> Candidates:  # fmt: skip
     """What differs by some level and is connected, in a frame that counts as the first one.
 
@@ -295,7 +299,7 @@ def components(
                             np.ones((3, 3), np.uint8))  # fmt: skip
     left, top, wide, high = cv2.boundingRect(mask)
     shown = mask[top : top + max(high, 1), left : left + max(wide, 1)]
-    shown = solid(shown) if without_thin else shown
+    shown = shown if thin else without_strings(shown)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(shown)
     area = stats[:, cv2.CC_STAT_AREA].astype(float)
     order = 1 + np.argsort(-area[1:])[:_KEPT]  # the largest: the others are noise

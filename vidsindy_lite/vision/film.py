@@ -154,12 +154,17 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
     n = len(lights)
     boxed = None if hint is None else hint.boxed(film.frames.info.size, n, film.frames.factor)
     seed = boxed and _tightened(seen, boxed)
-    paths = _paths(seen, hint, seed)
+    paths, bare = _paths(seen, hint, seed), False
+    if seed is None and not _plain(paths, n):  # it may hang on a string
+        others = sighted(film, bare=True)
+        plainer = _paths(others[0], hint, seed)
+        if bare := _plain(plainer, n):
+            (seen, lights), paths = others, plainer
     if not paths and seed is None:
         return nothing(film.motion, n, film.doubts)
     covered = _covering(film, seen, paths[0].rows, seed) if paths else None
     if covered is not None:  # it covers its own ground: before ground that is without it
-        others = sighted(film, covered)
+        others = sighted(film, covered, bare=bare)
         plainer = _paths(others[0], hint, seed)
         # A path that is far less plain there is of what was taken out in its place.
         if plainer and plainer[0].rating >= 0.5 * paths[0].rating:
@@ -201,15 +206,15 @@ def unsure(found: Track) -> tuple[str, ...]:
 
 
 def sighted(
-    film: Film, boxes: Floats | None = None, targets: int = 1
+    film: Film, boxes: Floats | None = None, targets: int = 1, *, bare: bool = False
 ) -> tuple[Candidates, list[Floats32]]:
-    """What may be the target in each frame, and how bright the frame is."""
+    """What may be the target in each frame, and how bright the frame is; see `candidates`."""
     plate, noise = film.ground(boxes)
     frames: Iterable[Image] = film.frames
     if noise > 12:  # grey levels, in which no pixel is told alone
         frames = (np.asarray(cv2.GaussianBlur(frame, (0, 0), 1.0), np.uint8) for frame in frames)
         noise /= 2 * np.sqrt(np.pi)
-    return candidates(frames, film.maps, plate, noise, targets)
+    return candidates(frames, film.maps, plate, noise, targets, bare)
 
 
 def _paths(seen: Candidates, hint: Hint | None, seed: Spot | None) -> list[Motion]:
@@ -228,6 +233,14 @@ def _paths(seen: Candidates, hint: Hint | None, seed: Spot | None) -> list[Motio
         liked = seen._replace(quality=seen.quality * hint.likeness(seen.colour, seen.behind))
     # Of less, noise is made.
     return [path for path in plainest_paths(liked) if np.median(seen.quality[path.rows]) > 0.2]
+
+
+def _plain(paths: Sequence[Motion], n: int) -> bool:
+    """Is there a path worth much in n frames? What is plain in all of them is worth .4 to .7 each.
+
+    Half of that: it may be away for a while.
+    """
+    return bool(paths) and paths[0].rating > 0.2 * n
 
 
 def _tightened(seen: Candidates, seed: Spot) -> Spot:
