@@ -298,6 +298,7 @@ def signed_distance(x, p1, p2, p3):
     return normal @ (x - p1) / np.linalg.norm(normal)
 
 
+# %%
 X, Y, Z = R
 origin, C = np.zeros(3), camera.position
 distance = {
