@@ -271,14 +271,16 @@ def _let_go(pixels: Floats, start: int) -> tuple[Floats, str]:
     """A track that starts at some frame, without the rest before its motion, and what to say of it.
 
     From rest, in twice the time it moves four times as far: so it was let go as long before it had
-    moved by one step as that is before four.
+    moved by one step as that is before four. What grows by itself has moved by a quarter by then,
+    or was hardly longer at rest.
     """
     seen = np.flatnonzero(np.isfinite(pixels).all(axis=1))
     apart = np.linalg.norm(pixels[seen] - np.median(pixels[seen[:5]], axis=0), axis=1)
     step = max(0.02 * apart.max(), 2.0)  # pixels, more than a track errs
     once, fourth = (seen[int((apart > far).argmax())] for far in (step, 4 * step))
     released = 2 * once - fourth
-    if apart.max() <= 4 * step or released < seen[0] + 5:
+    moved = apart[seen < released].max(initial=0.0) > 0.2 * step
+    if moved or apart.max() <= 4 * step or released - seen[0] < max(5, 2 * (fourth - once)):
         return pixels, ""
     told = f"it rests until frame {start + released}: counted from {start + once} on"
     return np.where(np.arange(len(pixels))[:, None] < once, np.nan, pixels), told

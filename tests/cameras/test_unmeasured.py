@@ -241,8 +241,7 @@ def test_the_law_of_a_swing_needs_no_rig():
 def test_three_telephones_of_which_nothing_is_known():
     hints = [None, None, vl.Hint(frame=0, box=(68, 38, 70, 82))]
     found = vl.discover_from_videos([real(f"can_{i}") for i in (1, 2, 3)], hints=hints)
-    assert abs(found.period.value - 40.2 / 30) < 3 * found.period.error
-    assert found.period.error < 0.02 * found.period.value
+    assert abs(found.period.value - 40.2 / 30) < 3 * found.period.error < 0.08
 
 
 def test_affine_cameras_see_what_their_axes_say_and_have_a_file(tmp_path):

@@ -91,7 +91,6 @@ def test_an_input_that_the_law_does_not_have_changes_no_physics():
     found = vl.discover(T, noisy(x[:, None], 0.01), library=Library.polynomial(1) + U, order=2)
     assert terms(found.system, "vx") == {"x", "vx"}
     assert found.physics()["period"].value == pytest.approx(np.pi, abs=0.01)
-    assert "and never rises" in str(found.physics())
 
 
 @pytest.mark.parametrize("rate", [1.3j, -0.65 + 1.89j])  # of what drives it, or of its control
@@ -111,8 +110,7 @@ def test_a_law_with_an_input_is_saved_and_read_with_its_library(forced, tmp_path
     assert again.predict(state)[1] == forced.predict(state)[1]
     said = again.physics()  # of the same law without what drives it
     assert said["natural frequency"].value == pytest.approx(np.sqrt(2), abs=0.01)
-    assert "changes with the time" in str(said)
-    assert not said.energy
+    assert ("changes with the time" in str(said), said.energy) == (True, ())
     with pytest.raises(ValueError, match="library: must hold the function 'u'"):
         Discovery.load(tmp_path / "law.json")
     with pytest.raises(ValueError, match=r"t: must lie where u is known, got 42"):
