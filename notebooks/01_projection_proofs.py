@@ -214,6 +214,7 @@ def foot(x, n, d):
     return x - np.multiply.outer((x @ n + d) / (n @ n), n)
 
 
+# %%
 d = np.linspace(-80, 80, 41)
 feet = np.array([foot(x[0], n, value) for value in d])
 assert np.allclose(feet @ n + d, 0, atol=1e-12)
