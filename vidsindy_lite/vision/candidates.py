@@ -222,7 +222,7 @@ def candidates(
 ) -> tuple[Candidates, list[Floats32]]:  # fmt: skip
     """The candidates of all frames, and how much brighter each frame is than the ground.
 
-    If `bare`, those on which a string hangs without it, too.
+    If `bare`, without the strings on which they hang.
     """
     lights, found = [], []
     bound = tolerance(plate.image, least_difference(noise), moves=plate.moves)
@@ -237,10 +237,9 @@ def candidates(
         if others:
             witnesses.append((_from_neighbours(frame, others, plate.moves) / allowed, 0.7))
         one = _distinct(Candidates.joined(
-            components(strength, level, frame, ground, worth, thin)
+            components(strength, level, frame, ground, worth, bare)
             for strength, worth in witnesses
             for level in (1.0, 2.5, 6.0)  # tolerances by which what is connected differs
-            for thin in (True, False)[: 1 + bare]
         ))  # fmt: skip
         found.append(one._replace(frame=one.frame + i, place=carry(here, one.centre),
                                   colour=one.colour / lit))  # fmt: skip
@@ -288,7 +287,7 @@ def without_strings(mask: NDArray[Any]) -> Image:
 
 def components(
     strength: Floats32, level: float, frame: Image, ground: Image, worth: float = 1.0,
-    thin: bool = True,
+    bare: bool = False,
 ) -> Candidates:  # fmt: skip
     """What differs by some level and is connected, in a frame that counts as the first one.
 
@@ -299,7 +298,7 @@ def components(
                             np.ones((3, 3), np.uint8))  # fmt: skip
     left, top, wide, high = cv2.boundingRect(mask)
     shown = mask[top : top + max(high, 1), left : left + max(wide, 1)]
-    shown = shown if thin else without_strings(shown)
+    shown = without_strings(shown) if bare else shown
     count, labels, stats, _ = cv2.connectedComponentsWithStats(shown)
     area = stats[:, cv2.CC_STAT_AREA].astype(float)
     order = 1 + np.argsort(-area[1:])[:_KEPT]  # the largest: the others are noise
