@@ -882,9 +882,9 @@ def with_law(
         found = replace(found, orientation=found.orientation @ axes)
     elif not moves[: len(axes)].all():  # else they are the first, as a law's are
         found = replace(found, orientation=axes)
-    losses = [q for q in found.physics() if q.name.startswith(("damping", "drag"))]
-    grows = [str(q) for q in losses if (q.value + 4 * q.error < 0).all()]
-    if default and grows:
+    body = found.physics() if default else ()
+    losses = [q for q in body if q.name.startswith(("damping", "drag"))]
+    if grows := [str(q) for q in losses if (q.value + 4 * q.error < 0).all()]:
         doubt = f"{', '.join(grows)}: what nothing drives loses energy; the film may run backwards"
         found = replace(found, warnings=(*found.warnings, doubt))
     # Who keeps the law alone keeps the doubts about what it was found in.

@@ -558,10 +558,11 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
     degree = int(problem.exponents[fit.state.active.any(axis=1)].sum(axis=1).max(initial=1))
     counts, states = fit.collocation.counts, problem.form.states
     error = typical((effective_noise(fit) / np.sqrt(np.maximum(counts, 1)))[counts > 0])
-    inputs = {f.name: f.value(x) for f in problem.functions if f.of_time}
-    every = np.column_stack([x[:, :states], *inputs.values()])
-    found = list(related([*names[:states], *inputs], every, 1, error))
-    yield from found or related(names[:states], x[:, :states], degree, error)
+    told, inputs = [], {f.name: f.value(x) for f in problem.functions if f.of_time}
+    if inputs:
+        every = np.column_stack([x[:, :states], *inputs.values()])
+        told = list(related([*names[:states], *inputs], every, 1, error))
+    yield from told or related(names[:states], x[:, :states], degree, error)
 
 
 def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:
