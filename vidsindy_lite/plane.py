@@ -276,7 +276,7 @@ def _let_go(pixels: Floats, start: int) -> tuple[Floats, str]:
     """
     seen = np.flatnonzero(np.isfinite(pixels).all(axis=1))
     apart = np.linalg.norm(pixels[seen] - np.median(pixels[seen[:5]], axis=0), axis=1)
-    step = max(0.02 * apart.max(), 2.0)  # pixels, more than a track errs
+    step = max(0.05 * apart.max(), 2.0)  # pixels, more than a hand trembles or a track errs
     once, fourth = (seen[int((apart > far).argmax())] for far in (step, 4 * step))
     released = 2 * once - fourth
     moved = apart[seen < released].max(initial=0.0) > 0.2 * step
