@@ -103,6 +103,15 @@ def test_an_input_that_follows_from_the_state_is_told(rate):
     assert any("x, vx, u depend on each other" in doubt for doubt in found.warnings)
 
 
+@pytest.mark.parametrize(("start", "order", "doubts"), [(0, "auto", 1), (0, 1, 0), (2, "auto", 0)])
+def test_under_one_steady_sine_the_order_is_not_told(start, order, doubts):
+    x = start * np.exp(-0.4 * T) + (0.4 * np.sin(1.3 * T) - 1.3 * np.cos(1.3 * T)) / 1.85
+    library = Library.polynomial(1) + Library.inputs(T, {"u": np.sin(1.3 * T)})
+    found = vl.discover(T, noisy(x[:, None], 0.01), library=library, order=order)
+    assert sum("orders 1 and 2 fit alike" in doubt for doubt in found.warnings) == doubts
+    assert terms(found.system, "x") == {"x", "u"}
+
+
 def test_a_law_with_an_input_is_saved_and_read_with_its_library(forced, tmp_path):
     forced.save(tmp_path / "law.json")
     again = Discovery.load(tmp_path / "law.json", CUBIC + U)

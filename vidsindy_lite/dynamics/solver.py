@@ -26,7 +26,7 @@ from ..progress import bar
 from .bspline import DEGREE
 from .collocation import Fit, Status
 from .data import Trajectory, check_sigma, check_systematic, check_trajectories, coordinate_names
-from .diagnostics import diagnose, is_on_circle
+from .diagnostics import CLOSE, diagnose, is_on_circle
 from .inference import infer, with_errors
 from .l0 import STRONG
 from .library import Library, check_library, monomial_exponents, monomials
@@ -203,6 +203,12 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     found, problem, fit = _solved(task, task.form(2 if order == 2 else 1))
     if order == 1 or task.library.given:
         return found
+    if order == "auto" and driven_alone(problem, fit):
+        doubt = (
+            f"{' and '.join(task.names)} all but follows from the inputs and their rates: laws of "
+            "orders 1 and 2 fit alike; say which, or record how it starts or comes to rest"
+        )
+        found = replace(found, warnings=(*found.warnings, doubt))
     if order == "auto" and fit.state.active[1:].any() and len(task.names) == 1:
         # What only rises or falls on a line passes no place twice, or hardly: forces may pull it.
         # Linear ones without a constant pull also hold where the law of first order is linear.
@@ -330,6 +336,20 @@ def check_order(order: object, origin: str) -> None:
     if isinstance(order, bool | float) or order not in (1, 2, "auto"):
         raise ValueError(f"order: must be 1, 2 or 'auto', got {shown(order)}")
     check_choice("origin", origin, ("learn", "data"))
+
+
+def driven_alone(problem: Problem, fit: Fit) -> bool:
+    """Whether all states are combinations of the inputs now and a little later.
+
+    Such is what is left of any linear law, of whatever order, under one steady sine.
+    """
+    now, _ = fit.collocation.node_states(fit.state.control_points)
+    later = now + np.eye(now.shape[1])[-1]  # by a time in which the motion changes by its size
+    inputs = [f.value(x) for f in problem.functions if f.of_time for x in (now, later)]
+    terms = np.column_stack([np.ones(len(now)), *inputs])
+    known = np.isfinite(terms).all(axis=1)
+    states = now[known, : problem.form.states]
+    return bool(inputs) and unexplained(terms[known], states) < CLOSE**2
 
 
 def accelerated(curves: Sequence[BSpline]) -> bool:

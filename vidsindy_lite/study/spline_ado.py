@@ -264,7 +264,7 @@ class _Fit:
         miss = 2 / len(error) * error
         pull = 2 * self.settings.physics_weight / len(residual) * residual
         jacobian = self.derivatives[:, rows[:, None], rows] @ law
-        by_point = np.stack([(products @ part * pull).sum(axis=1) for part in jacobian], axis=1)
+        by_point = np.stack([np.einsum("kl,kl->k", products @ part, pull) for part in jacobian], 1)
         by_coefficient = np.zeros_like(self.coefficients)
         by_coefficient[rows] = -products.T @ pull
         return (
