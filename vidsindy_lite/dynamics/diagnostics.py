@@ -26,7 +26,7 @@ from .l0 import RIDGE, STRONG, far_neighbours, newcomers, prior_penalties
 from .library import monomial_exponents, monomials, shift_generators, shift_matrix
 from .mechanics import FAINT, Round, on_circle, on_sphere
 from .model import PolynomialSystem, place, spoken
-from .noise import CONSISTENT, GROSS, effective_noise, passing, residual_noise
+from .noise import CONSISTENT, GROSS, TOLERATED, effective_noise, passing, residual_noise
 from .problem import COARSE, Problem, typical
 from .result import Path
 
@@ -654,7 +654,8 @@ def _rivals(
     """Do other terms, coefficients that change or another origin explain the data as well?"""
     if clean and not problem.has_process_noise:
         return  # what is left is the error of the splines, not noise: it settles nothing
-    yield from _changing(problem, fit, path.tolerated)
+    # What changes leaves smooth errors itself: no more of these are tolerated than by a first law.
+    yield from _changing(problem, fit, min(path.tolerated, max(TOLERATED / path.own, 1.0)))
     begins = max(plateau.low for plateau in path.of(fit.state.active))
     tolerant = clean or begins > path.lowest
     found = wider.beyond
