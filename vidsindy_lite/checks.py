@@ -76,10 +76,10 @@ def check_path(name: str, value: str | os.PathLike) -> Path:
 
 
 def check_output(name: str, value: str | os.PathLike) -> Path:
-    """A file that can be written: its folder exists, and it is no folder itself."""
+    """A file that can be written, with folders around it that may be made; no folder itself."""
     path = check_path(name, value)
-    if path.is_dir() or not path.parent.is_dir():
-        raise ValueError(f"{name}: must be a file in a folder that exists, got '{path}'")
+    if path.is_dir():
+        raise ValueError(f"{name}: must be a file, got the folder '{path}'")
     return path
 
 

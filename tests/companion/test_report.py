@@ -171,10 +171,10 @@ def test_other_peoples_files_are_not_overwritten(tmp_path):
     (tmp_path / "report.html").write_text("a report of mine")
     with pytest.raises(ValueError, match=r"got '.*' with report\.html, rig\.toml"):
         check_folder_is_free(tmp_path)
-    with pytest.raises(ValueError, match="out: the folder must be one that exists and can be"):
-        check_folder_is_free(tmp_path / "rig.toml")
-    with pytest.raises(ValueError, match="out: the folder around it must be one that exists"):
-        check_folder_is_free(tmp_path / "a" / "b")
+    for place in ("", "below", "below/it"):
+        with pytest.raises(ValueError, match="out: must be a folder that can be written"):
+            check_folder_is_free(tmp_path / "rig.toml" / place)
+    assert check_folder_is_free(tmp_path / "a" / "b") == tmp_path / "a" / "b"  # made when written
 
 
 def test_strange_names_do_not_spoil_the_report_nor_it_the_figures_of_a_notebook(case, tmp_path):

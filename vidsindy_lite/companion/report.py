@@ -108,13 +108,11 @@ def check_folder_is_free(folder: str | Path) -> Path:
         If files of these names are none of a report, it is no folder, or cannot be written to.
     """
     folder = check_path("out", folder)
-    there = folder if folder.exists() else folder.absolute().parent
-    whose = "folder" if there == folder else "folder around it"
+    there = next(one for one in (folder, *folder.absolute().parents) if one.exists())
     try:
         tempfile.TemporaryFile(dir=there).close()
     except OSError:
-        rule = "must be one that exists and can be written to"
-        raise ValueError(f"out: the {whose} {rule}, got '{folder}'") from None
+        raise ValueError(f"out: must be a folder that can be written, got '{folder}'") from None
     strange = [name for name in FILES if (folder / name).exists()]
     if strange and not _holds(folder / PAGE, *_TITLES):
         raise ValueError(

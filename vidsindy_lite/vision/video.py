@@ -311,8 +311,7 @@ def write_video(
         allowed = " or ".join(CODECS[codec].suffixes)
         raise ValueError(f"path: must end in {allowed} for {codec}, got '{path}'")
     rate = _frame_rate(fps, suffix)
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"path: the folder must exist, got '{path.parent}'")
+    path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.stem}.{os.getpid()}{suffix}")
     try:
         _encode(partial, frames, rate, CODECS[codec], path)
