@@ -171,9 +171,8 @@ def test_other_peoples_files_are_not_overwritten(tmp_path):
     (tmp_path / "report.html").write_text("a report of mine")
     with pytest.raises(ValueError, match=r"got '.*' with report\.html, rig\.toml"):
         check_folder_is_free(tmp_path)
-    for place in ("", "below", "below/it"):
-        with pytest.raises(ValueError, match="out: must be a folder that can be written"):
-            check_folder_is_free(tmp_path / "rig.toml" / place)
+    with pytest.raises(ValueError, match="out: must be a folder that can be written"):
+        check_folder_is_free(tmp_path / "rig.toml" / "below")
     assert check_folder_is_free(tmp_path / "a" / "b") == tmp_path / "a" / "b"  # made when written
 
 

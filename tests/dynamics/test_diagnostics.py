@@ -149,12 +149,11 @@ def moved(flow, origin, error, level, draw=0, n=1500):
 
 
 def duffings(*stiffness, noise):
-    """A run of a hardening spring for each stiffness, in noise, of each run or of all."""
+    """A run of a hardening spring for each stiffness, and its noise."""
     laws = [{"x": {"y": 1}, "y": {"x": -k, "x^3": -0.3, "y": -0.1}} for k in stiffness]
     t, rng = np.linspace(0, 20, 300), np.random.default_rng(7)
     runs = [PolynomialSystem.from_terms(law).simulate(t, (1.5, 0)) for law in laws]
-    levels = np.broadcast_to(noise, len(runs)).tolist()
-    return [(t, add_noise(x, level, rng)) for x, level in zip(runs, levels, strict=True)]
+    return [(t, add_noise(x, level, rng)) for x, level in zip(runs, noise, strict=True)]
 
 
 def differing(found):
@@ -164,8 +163,8 @@ def differing(found):
 @pytest.mark.parametrize(
     ("stiffness", "told", "noise"),
     [
-        ((1, 1, 1.05), ["run 2"], 0.03), ((1, 1.12, 1), ["run 1"], 0.1), ((1, 1, 1), [], 0.03),
-        ((1, 1, 1.03, 1), ["run 2"], (0.005, 0.02, 0.05, 0.01)),
+        ((1, 1, 1.05), ["run 2"], [0.03] * 3), ((1, 1.12, 1), ["run 1"], [0.1] * 3),
+        ((1, 1, 1), [], [0.03] * 3), ((1, 1, 1.03, 1), ["run 2"], [0.005, 0.02, 0.05, 0.01]),
     ],
 )  # fmt: skip
 def test_runs_of_different_systems_are_told(stiffness, told, noise):
