@@ -108,8 +108,9 @@ def infer(
     def told(curve: BSpline) -> BSpline:
         return BSpline(curve.t * units.time, curve.c * units.scale + units.centre, DEGREE)
 
-    found = Discovery(
-        **_in_both_frames(problem, fit, model, offset, penalties),
+    around = bent(fit).collocation.linearise(state, np.flatnonzero(state.free()))
+    return Discovery(
+        **_in_both_frames(problem, fit, around, offset, penalties),
         native=form.law(coefficients + form.known),
         offset=offset,
         noise=np.where(collocation.counts > 0, noise * units.scale, np.nan),
@@ -121,8 +122,6 @@ def infer(
         curves=tuple(map(told, fit.splines)),
         across=tuple(map(told, across_gaps(problem, fit))),
     )
-    around = bent(fit).collocation.linearise(state, np.flatnonzero(state.free()))
-    return with_errors(found, problem, fit, around)
 
 
 def with_errors(found: Discovery, problem: Problem, fit: Fit, model: Linearisation) -> Discovery:
