@@ -245,7 +245,7 @@ def observe_tracks(
                 f"are shares of the image multiply them by its size, {camera.image_size}"
             )
     cleared = [without_wild(*each) for each in zip(raw, names, strict=True)]
-    raw, said = [track for track, _ in cleared], [left_out for _, left_out in cleared]
+    raw, said = [track for track, _ in cleared], [wild for _, wild in cleared]
     if isinstance(lags, str):
         check_choice("lags", lags, ["synchronous"])
         found = _observed(raw, rig, clock, np.zeros(len(raw)), names, synchronous=True)
@@ -307,6 +307,14 @@ def _observed(
     tracks = replace(films, lags=told.frames, rates=best.rates).aligned
     with refusing("cameras", raw, names):
         learned = cameras.learn_cameras(tracks, rig)
+        cleared, strays = cameras.without_strays(tracks, learned)
+        if strays.any():
+            tracks, learned = tuple(cleared), cameras.learn_cameras(cleared, rig)
+    said = [
+        left_out(name, "which the other views contradict", np.flatnonzero(rows))
+        for name, rows in zip(names, strays.T, strict=True)
+    ]
+    learned = noted(learned, *said)
     missed = cameras.disagreement(tracks, learned)
     if affine is not None:  # pinholes that leave more than parallel projections are none
         left = max(cameras.disagreement(affine.tracks, affine.rig), default=0.0)
@@ -367,7 +375,7 @@ def _several_observed(
     return replace(
         seen,
         tracks=tuple(cameras.side_by_side(track, count) for track in seen.tracks),
-        rig=cameras.paced(seen.rig, 1 / clock.rates),
+        rig=cameras.paced(replace(seen.rig, note=rig.note), 1 / clock.rates),
         lags=replace(seen.lags, frames=begun, rates=clock.rates),
         t=t,
         x=cameras.side_by_side(seen.x, count),
@@ -450,6 +458,15 @@ def noted(rig: Rig, *more: str) -> Rig:
     return replace(rig, note="; ".join(filter(None, (rig.note, *more))))
 
 
+def left_out(name: str, why: str, rows: Sequence[int] | Ints) -> str:
+    """What to note of frames of a track that do not count; nothing of none."""
+    if not len(rows):
+        return ""
+    runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+    told = [f"{run[0]} to {run[-1]}" if len(run) > 1 else str(run[0]) for run in runs]
+    return f"left out of {name}, {why}: frames {', '.join(told[:5])}{', ...' * (len(told) > 5)}"
+
+
 def without_wild(track: Floats, name: str) -> tuple[Floats, str]:
     """A track, (n, 2), without single places that are far from a smooth path; and which these were.
 
@@ -472,9 +489,7 @@ def without_wild(track: Floats, name: str) -> tuple[Floats, str]:
             wild.append(row)
     cleared = track.copy()
     cleared[wild] = np.nan
-    frames = ", ".join(map(str, wild[:5])) + (", ..." if len(wild) > 5 else "")
-    said = f"left out of {name}, far from their neighbours: frames {frames}"
-    return cleared, said if wild else ""
+    return cleared, left_out(name, "far from their neighbours", wild)
 
 
 def _missed(rows: Ints, track: Floats) -> Floats:
