@@ -28,6 +28,7 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import chdtri
 
 from ..arrays import Floats, Ints
 from ..checks import check_instance, check_items
@@ -340,13 +341,16 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
             "is known",
         )
     off = np.abs(found.change) / np.where(errors > 0, errors, np.inf)
-    # Standard errors that a measurement may be off.
-    if off.max() > 5.0:
+    # So many of the measurements the tracks tell: of each the share by which it is known better.
+    told = (found.prior > 0).sum() - (found.factor**2).sum(axis=1) @ found.prior
+    squares = (off**2).sum()
+    if squares > chdtri(max(told, 1.0), 1e-4):
         i, part = np.unravel_index(off.argmax(), off.shape)
         what = next(name for name, place in PARTS.items() if part in place)
         doubts += (
-            f"the {what} of cameras[{i}] is {off.max():.0f} times its error from what was "
-            "measured: check it, and how the others were measured",
+            f"the {what} of cameras[{i}] is {off.max():.1f} times its error from what was measured "
+            f"(of all cameras chi-square {squares:.0f}, where some {told:.0f} are expected): check "
+            "it, how the others were measured, and whether the tracks are in their order",
         )
     left = int((~intersect(found.cameras, views)[1]).sum())
     if left:

@@ -44,7 +44,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from ..arrays import Floats
+from ..arrays import Bools, Floats
 from ..checks import (
     check_array,
     check_choice,

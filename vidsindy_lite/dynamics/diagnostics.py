@@ -23,7 +23,7 @@ from .collocation import CLEANEST, Fit, Linearisation, State, Status, WithCurve
 from .data import Trajectory, typical_step
 from .frames import closed, free_offsets, laws_at
 from .l0 import RIDGE, STRONG, far_neighbours, newcomers, prior_penalties
-from .library import monomial_exponents, monomials, shift_generators, shift_matrix
+from .library import linearised, monomial_exponents, monomials, shift_generators, shift_matrix
 from .mechanics import FAINT, Round, on_circle, on_sphere
 from .model import PolynomialSystem, place, spoken
 from .noise import CONSISTENT, GROSS, TOLERATED, effective_noise, passing, residual_noise
@@ -546,6 +546,20 @@ def outliers(trajectories: Sequence[Trajectory], met: Sequence[Bools]) -> list[s
     ]
 
 
+def differenced(names: Sequence[str], trajectories: Sequence[Trajectory]) -> Iterator[str]:
+    """What to say of a coordinate that is another's difference over a step, to one side or both."""
+    t, x = max(trajectories, key=lambda run: len(run[0]))
+    rates = np.diff(x, axis=0) / np.diff(t)[:, None]
+    both = rates[1:] + rates[:-1]
+    for made, given in ((rates, x[1:]), (rates, x[:-1]), (both / 2, x[1:-1])):
+        off = np.abs(made[:, :, None] - given[:, None]).max(axis=0)
+        for i, j in np.argwhere(off < 1e-7 * x.std(axis=0)).tolist():  # but for rounding
+            yield (
+                f"{names[j]} is made of differences of {names[i]}: its errors are theirs, which "
+                "changes the law; leave it out, and say order=2"
+            )
+
+
 def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
     """What follows from where the motion takes place."""
     measured, names = problem.measured[0][1].shape[1], problem.form.names
@@ -554,6 +568,7 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
     whole = x[np.isfinite(x).all(axis=1)]
     if len(whole):
         yield from shapes(whole, noise, names[:measured])
+    yield from differenced(names, problem.measured)
     x, _ = fit.collocation.node_states(fit.state.control_points)
     degree = int(problem.exponents[fit.state.active.any(axis=1)].sum(axis=1).max(initial=1))
     counts, states = fit.collocation.counts, problem.form.states
@@ -745,8 +760,11 @@ def _sampling(problem: Problem, fit: Fit, law: PolynomialSystem, remedy: str) ->
     form, turns = problem.form, problem.turns
     # Along the law: between samples that are few it may turn more often than a smoothing tells.
     x, slopes = fit.collocation.node_states(fit.state.control_points)
-    speed = np.sqrt((slopes**2).mean() / x.var(axis=0).mean())
-    samples = 2 * np.pi / typical_step(problem.trajectories) / speed
+    speed, step = (
+        np.sqrt((slopes**2).mean() / x.var(axis=0).mean()),
+        typical_step(problem.trajectories),
+    )
+    samples = 2 * np.pi / step / speed
     # On a line nothing turns; a body need not, if it is seen from several starts.
     bound = form.states > 1 and (form.movable.all() or len(problem.trajectories) == 1)
     if turns < 1.5 and bound:
@@ -756,6 +774,16 @@ def _sampling(problem: Problem, fit: Fit, law: PolynomialSystem, remedy: str) ->
         )
     if samples < 2 * np.pi:  # a step is longer than a time scale of the motion
         yield f"only {samples:.1f} samples per turn of the motion: sample faster"
+    _, _, slopes = linearised(
+        x - fit.state.offset, fit.collocation.functions, fit.collocation.exponents,
+        fit.state.coefficients + fit.collocation.known,
+    )  # fmt: skip
+    grows = float(np.median(np.linalg.eigvals(np.nan_to_num(slopes)).real.max(axis=1))) * step
+    if grows > 1:
+        yield (
+            f"from one sample to the next what is small grows {np.exp(grows):.0f}-fold in the law, "
+            "which foretells none of them: sample faster, if it is the law at all"
+        )
     coarse = problem.samples_a_turn < COARSE
     if problem.has_process_noise and (coarse or turns < 10):
         few = f"{turns:.1f} turns of {problem.samples_a_turn:.0f} samples each"
