@@ -568,6 +568,9 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
     whole = x[np.isfinite(x).all(axis=1)]
     if len(whole):
         yield from shapes(whole, noise, names[:measured])
+        away = np.abs(whole.mean(axis=0)) / whole.std(axis=0)
+        for j in np.flatnonzero(away > 3e3).tolist():
+            yield f"{names[j]} is {away[j]:.0g} times its spread from zero: subtract a constant"
     yield from differenced(names, problem.measured)
     x, _ = fit.collocation.node_states(fit.state.control_points)
     degree = int(problem.exponents[fit.state.active.any(axis=1)].sum(axis=1).max(initial=1))

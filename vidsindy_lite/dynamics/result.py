@@ -161,7 +161,7 @@ class History:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What is to be told if the time was not enough."""
-        told = "the time limit ended the search: this is the best law so far; raise time_limit"
+        told = "the time limit of `discover` ended the search: this is the best law so far"
         return (told,) if self.over else ()
 
     def another(self) -> bool:
