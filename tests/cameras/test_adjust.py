@@ -100,6 +100,17 @@ def test_a_measurement_that_is_far_off_is_told():
     assert "times its error from what was measured" in warning
 
 
+@pytest.mark.parametrize(("times", "told"), [(1, 0), (3, 1)])
+def test_many_measurements_that_are_a_little_off_are_told_together(times, told):
+    rng, rig, _, tracks = film(12, 4)
+    given = [
+        replace(c, position=c.position + times * c.position_error * rng.normal(size=3))
+        for c in by_hand(rng, rig).cameras
+    ]
+    said = " ".join(learn_cameras(tracks, vl.Rig(given)).warnings)
+    assert said.count("is 3.1 times its error") == said.count("chi-square 63") == told
+
+
 def test_how_well_a_camera_is_known():
     """A tangential distortion is ten times as small as a radial one."""
     image = {"principal_point_error": 4.0, "distortion_error": 0.3, "readout_error": 0.2}

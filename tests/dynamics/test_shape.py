@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import PolynomialSystem, discover
-from vidsindy_lite.dynamics.diagnostics import related, shapes
+from vidsindy_lite.dynamics.diagnostics import differenced, related, shapes
 from vidsindy_lite.study import SYSTEMS, score
 
 TIMES = np.linspace(0, 12, 600)
@@ -144,3 +144,28 @@ def test_a_law_on_a_shape_is_never_simply_ok():
     x, words = NAMED["bob"]
     noisy = x + 0.01 * x.std() * np.random.default_rng(0).standard_normal(x.shape)
     assert any(words in warning for warning in discover(TIMES, noisy, order=2, degree=2).warnings)
+
+
+@pytest.mark.parametrize("made", ["before", "after", "around", ""])
+def test_differences_that_are_given_as_states_are_told(made):
+    x = pendulum(0.5)[:, 0] + 1e-3 * np.random.default_rng(0).standard_normal(len(TIMES))
+    steps, v = np.diff(x) / np.diff(TIMES), np.gradient(x, TIMES)
+    v = v + 1e-3 * v.std() if not made else v  # not their differences, but for a thousandth
+    x, v = {"before": (x[1:], steps), "after": (x[:-1], steps)}.get(made, (x, v))
+    said = " ".join(differenced(["x", "v"], [(TIMES[: len(x)], np.stack([x, v], axis=1))]))
+    assert said.startswith("v is made of differences of x: ") == bool(made)
+
+
+def test_what_is_far_from_zero_is_told_to_be_moved():
+    x = pendulum(0.5)
+    for away, said in ((100, False), (5000, True)):
+        found = discover(TIMES, x + [away, 0], degree=1, order=1)
+        assert any("subtract a constant" in doubt for doubt in found.warnings) == said
+
+
+def test_a_law_that_foretells_no_sample_from_the_one_before_is_told():
+    t = np.linspace(0, 20, 800)  # a pulse every two, which a loop through a saddle imitates
+    pulses = np.exp(-((((t + 0.6) % 2 - 1) / 0.05) ** 2))
+    pulses += 0.005 * np.random.default_rng(0).standard_normal(800)
+    found = discover(t, pulses[:, None])
+    assert any("from one sample to the next" in doubt for doubt in found.warnings)

@@ -104,17 +104,6 @@ def test_where_cameras_cannot_be_learned_no_method_has_a_law(this_film, monkeypa
     assert (row["exact"], row["no path"], row["wrong, ok"]) == ("0 of 6", 6, None)
 
 
-def test_doubts_of_the_observation_are_doubts_of_the_trial(this_film, monkeypatch):
-    path = experiments.trial_path
-    doubtful = lambda trial: path(trial)._replace(warnings=("the views disagree",))  # noqa: E731
-    trial = Trial("SprottE", trial=1, source="truth", frames=150)
-    assert run_trial(trial).status == "ok"
-    monkeypatch.setattr(experiments, "trial_path", doubtful)
-    result = run_trial(trial)
-    assert (result.status, result.warnings[0]) == ("suspect", "the views disagree")
-    assert run_trial(replace(trial, method="PySINDy")).status is None
-
-
 def test_data_depend_on_system_condition_level_and_number_alone():
     x = SYSTEMS["Lorenz"].trajectory(FRAMES)[1]
     trial = Trial("Lorenz", "noise", 0.1, 3, frames=FRAMES)

@@ -1,7 +1,6 @@
 """Films in which anybody sees the target, those of telephones, and hints: nothing goes unsaid."""
 
 import re
-from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -13,8 +12,7 @@ import vidsindy_lite
 from vidsindy_lite import Hint, track, write_video
 from vidsindy_lite.vision import Track, load_hints
 from vidsindy_lite.vision.camera import CameraMotion, at_rest
-from vidsindy_lite.vision.candidates import Candidates
-from vidsindy_lite.vision.film import expected, finished, unsure
+from vidsindy_lite.vision.film import finished, unsure
 from vidsindy_lite.vision.refining import View, roughness
 from vidsindy_lite.vision.rendering import BACKGROUNDS
 
@@ -324,44 +322,6 @@ def test_a_large_target_is_plainer_than_leaves_that_sway(tmp_path):
     found, error = followed(tmp_path / "clip.mp4", truth, least=0)
     assert np.nanpercentile(error, 95) < 1.5
     assert not found.warnings
-
-
-def followed_to(n=30, factor=1, maps=None):
-    """Where a thing is expected that is seen in a few of n frames, on a parabola."""
-    at = np.array([6, 7, 8, 9, 12, 13, 14])
-    m = len(at)
-    centre = np.column_stack([20 + 3.0 * at, 90 - 2.0 * at + 0.25 * at**2])
-    box = np.column_stack([centre - 50, np.full(m, 12.0), np.full(m, 6.0)])  # boxes lag behind
-    colour = np.where(np.arange(m)[:, None] < 1, [50.0, 80, 20], [90.0, 80, 20])
-    seen = Candidates(at, centre, centre, box, np.full(m, 64.0), colour, 0 * colour,
-                      np.full(m, 0.9))  # fmt: skip
-    maps = np.tile(np.eye(3), (n, 1, 1)) if maps is None else maps
-    film = SimpleNamespace(maps=maps, frames=SimpleNamespace(factor=factor))
-    return expected(seen, np.arange(m), film, n)
-
-
-def test_a_target_is_expected_on_its_way_between_its_sightings_and_three_frames_beyond():
-    ways, k = followed_to(), np.arange(30)
-    near = (k >= 3) & (k <= 17)
-    np.testing.assert_array_equal(np.isfinite(ways.centre[:, 0]), near)
-    np.testing.assert_array_equal(np.isfinite(ways.box[:, 0]), near)
-    parabola = np.column_stack([20 + 3.0 * k, 90 - 2.0 * k + 0.25 * k**2])
-    within = (k >= 10) & (k <= 11)  # in a straight line
-    np.testing.assert_allclose(ways.centre[near & ~within], parabola[near & ~within], atol=1e-6)
-    line = parabola[9] + np.array([[1], [2]]) / 3 * (parabola[12] - parabola[9])
-    np.testing.assert_allclose(ways.centre[within], line)
-    np.testing.assert_allclose(ways.box[near, :2], ways.centre[near] - [6, 3])
-    np.testing.assert_allclose(ways.box[near, 2:], [[12, 6]] * near.sum())
-
-    # Where the camera sees it, and in whole frames: pixel 10 of those that are reduced by 3 is made
-    # of pixels 30 to 32.
-    maps = np.tile(np.eye(3), (30, 1, 1))
-    maps[:, 0, 2], maps[:, 1, 2] = 2 * k, -k
-    moved = ways.centre - np.column_stack([2 * k, -k])
-    np.testing.assert_allclose(followed_to(maps=maps).centre[near], moved[near])
-    whole = followed_to(factor=3)
-    np.testing.assert_allclose(whole.centre[near], 3 * ways.centre[near] + 1)
-    np.testing.assert_allclose(whole.box[near], 3 * ways.box[near])
 
 
 def along(n, areas=100.0, half=5.0, **looks):
