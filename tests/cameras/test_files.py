@@ -226,10 +226,11 @@ def test_malformed_tables_are_refused_by_name(tmp_path, old, new, message):
         ("a.json", '{"P": 5}', "must hold 11 DLT coefficients"),
         (
             "a.json",
-            '{"K": [1, 0, 1, 0, 1, 1, 0, 0, 1], "R": [2, 0, 0, 0, 1, 0, 0, 0, 1], "t": [0, 0, 1]}',
+            '{"K": [9, 0, 5, 0, 9, 5, 0, 0, 1], "R": [2, 0, 0, 0, 1, 0, 0, 0, 1], "t": [0, 0, 1]}',
             "R: must be a rotation, got a matrix that is none",
         ),
         ("a.json", '{"K": "x", "R": 1, "t": 2}', "K: must be an array of real numbers"),
+        ("a.json", '{"K": [9, 0, 0.5, 0, 9, 0.5, 0, 0, 1], "R": 1, "t": 2}', "K: must be in pixels"),
         ("a.npy", "\udc93NUMPY\x01\0v\0{'descr'", "must be a .npy file of numbers"),
         ("a.xml", "<?xml", "must be a XML file"),
         ("a.yaml", "", "must be a YAML file"),

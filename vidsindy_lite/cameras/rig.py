@@ -756,6 +756,8 @@ def _camera(table: dict[str, Any]) -> PerspectiveCamera:
     skew = abs(inner[0, 1] / inner[1, 1]) * inner[1, 2]
     if skew > ROUNDING:
         raise ValueError(f"K: must have no skew, got {inner[0, 1]:g}")
+    if (np.abs(inner[:2, 2]) <= 1).all():
+        raise ValueError(f"K: must be in pixels from the image's corner, got {inner.tolist()}")
     turned = check_array("R", table["R"])
     if turned.size == 3:
         axis = _shaped("R", turned, (3,))
