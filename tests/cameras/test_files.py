@@ -230,7 +230,7 @@ def test_malformed_tables_are_refused_by_name(tmp_path, old, new, message):
             "R: must be a rotation, got a matrix that is none",
         ),
         ("a.json", '{"K": "x", "R": 1, "t": 2}', "K: must be an array of real numbers"),
-        ("a.json", '{"K": [9, 0, 0.5, 0, 9, 0.5, 0, 0, 1], "R": 1, "t": 2}', "K: must be in pixels"),
+        ("a.json", '{"K": [9, 0, 0.5, 0, 9, 0.5, 0, 0, 1], "R": 1, "t": 2}', "K: must be in pix"),
         ("a.npy", "\udc93NUMPY\x01\0v\0{'descr'", "must be a .npy file of numbers"),
         ("a.xml", "<?xml", "must be a XML file"),
         ("a.yaml", "", "must be a YAML file"),

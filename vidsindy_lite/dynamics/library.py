@@ -635,8 +635,8 @@ class Library:
         taken = [*names, *(function.name for function in functions)]
         if clash := next((name for name in taken if taken.count(name) > 1), None):
             raise ValueError(
-                f"library: a term must have a name of its own, got {clash!r} twice (with order 2, x "
-                "are positions alone, of which the velocities are made)"
+                f"library: a term must have a name of its own, got {clash!r} twice (with order 2, "
+                "x are positions alone, of which the velocities are made)"
             )
         powers = np.empty((0, d), dtype=int)
         if self.degree is not None:
