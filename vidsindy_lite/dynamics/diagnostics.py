@@ -763,10 +763,8 @@ def _sampling(problem: Problem, fit: Fit, law: PolynomialSystem, remedy: str) ->
     form, turns = problem.form, problem.turns
     # Along the law: between samples that are few it may turn more often than a smoothing tells.
     x, slopes = fit.collocation.node_states(fit.state.control_points)
-    speed, step = (
-        np.sqrt((slopes**2).mean() / x.var(axis=0).mean()),
-        typical_step(problem.trajectories),
-    )
+    speed = np.sqrt((slopes**2).mean() / x.var(axis=0).mean())
+    step = typical_step(problem.trajectories)
     samples = 2 * np.pi / step / speed
     # On a line nothing turns; a body need not, if it is seen from several starts.
     bound = form.states > 1 and (form.movable.all() or len(problem.trajectories) == 1)
