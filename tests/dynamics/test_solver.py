@@ -189,7 +189,7 @@ def test_kicks_are_not_sought_when_the_time_is_over(monkeypatch):
     with pytest.raises(AssertionError):
         discover(t, x, order=1)
     found = discover(t, x, order=1, time_limit=1e-9)
-    assert "the time limit ended the search" in found.warnings[0]
+    assert "the time limit of `discover` ended the search" in found.warnings[0]
 
 
 # -- warnings --------------------------------------------------------------------------------------
