@@ -82,10 +82,10 @@ def test_a_throw_before_three_cameras_has_the_law_of_its_flight():
 def test_few_places_that_other_views_contradict_do_not_count(views, wild, blamed):
     tracks, rig = before_three_cameras(thrown(np.arange(40) / 30))
     tracks[1][:wild] += 60
-    cleared, strays = cameras.without_strays(tracks[:views], vl.Rig(rig.cameras[:views]))
+    cleared, outliers = cameras.without_view_outliers(tracks[:views], vl.Rig(rig.cameras[:views]))
     expected = np.zeros((40, views), dtype=bool)
     expected[:wild, blamed] = True  # of two views nobody knows which, and of many it is the rig
-    np.testing.assert_array_equal(strays, expected)
+    np.testing.assert_array_equal(outliers, expected)
     np.testing.assert_array_equal(np.isnan(np.stack(cleared, axis=1)).all(axis=2), expected)
 
 

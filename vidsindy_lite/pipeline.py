@@ -307,14 +307,12 @@ def _observed(
     tracks = replace(films, lags=told.frames, rates=best.rates).aligned
     with refusing("cameras", raw, names):
         learned = cameras.learn_cameras(tracks, rig)
-        cleared, strays = cameras.without_strays(tracks, learned)
-        if strays.any():
-            tracks, learned = tuple(cleared), cameras.learn_cameras(cleared, rig)
-    said = [
-        left_out(name, "which the other views contradict", np.flatnonzero(rows))
-        for name, rows in zip(names, strays.T, strict=True)
-    ]
-    learned = noted(learned, *said)
+        cleared, outliers = cameras.without_view_outliers(tracks, learned)
+        if outliers.any():
+            tracks, why = tuple(cleared), "which the other views contradict"
+            each = zip(names, map(np.flatnonzero, outliers.T), strict=True)
+            said = (left_out(name, why, rows) for name, rows in each)
+            learned = noted(cameras.learn_cameras(cleared, rig), *said)
     missed = cameras.disagreement(tracks, learned)
     if affine is not None:  # pinholes that leave more than parallel projections are none
         left = max(cameras.disagreement(affine.tracks, affine.rig), default=0.0)
@@ -372,6 +370,7 @@ def _several_observed(
     long = Clock.of_tracks((np.append(t, t[-1] + step) + later).ravel()[:-1], rows)
     seen = _observed(rows, rig, long, 0 * begun, names, (*doubts, *who.doubts), progress)
     modes = [cameras.side_by_side(mode, count) for mode in seen.systematic]
+    # The frames that its note names are those of the long track: it is left as it was given.
     return replace(
         seen,
         tracks=tuple(cameras.side_by_side(track, count) for track in seen.tracks),

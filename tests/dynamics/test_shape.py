@@ -154,12 +154,12 @@ def test_differences_that_are_given_as_states_are_told(made):
     x, v = {"before": (x[1:], steps), "after": (x[:-1], steps)}.get(made, (x, v))
     said = " ".join(differenced(["x", "v"], [(TIMES[: len(x)], np.stack([x, v], axis=1))]))
     assert said.startswith("v is made of differences of x: ") == bool(made)
+    assert not list(differenced(["x", "v"], [(TIMES[:2], x[:2, None] * [1, 2])] * 50))
 
 
 def test_what_is_far_from_zero_is_told_to_be_moved():
-    x = pendulum(0.5)
     for away, said in ((100, False), (5000, True)):
-        found = discover(TIMES, x + [away, 0], degree=1, order=1)
+        found = discover(TIMES, pendulum(0.5) + [away, 0], degree=1, order=1)
         assert any("subtract a constant" in doubt for doubt in found.warnings) == said
 
 

@@ -21,7 +21,7 @@ from .clocks import Clock, Footage, Lags, align, list_lags
 from .models import AffineCamera, Camera, OrthographicCamera, PerspectiveCamera
 from .models import rodrigues, rotation_to_z
 from .rig import BETTER, DISAGREEMENT, GROSS, Rig, disagreement, paced, read_calibration
-from .rig import reconstruct, residuals, rig_template, without_strays
+from .rig import reconstruct, residuals, rig_template, without_view_outliers
 from .synchronise import find_mistake, learn_lags
 from .targets import identify, side_by_side, stacked
 from .unmeasured import Factorised, factorised, posed

@@ -394,7 +394,7 @@ def disagreement(tracks: Sequence[Floats], rig: Rig) -> list[float]:
     return [trimmed(part) for part in residuals(tracks, rig)]
 
 
-def without_strays(tracks: Sequence[Floats], rig: Rig) -> tuple[list[Floats], Bools]:
+def without_view_outliers(tracks: Sequence[Floats], rig: Rig) -> tuple[list[Floats], Bools]:
     """Tracks without the places that the other views contradict, and which these are, (n, m).
 
     In each of the few frames that are missed by far more than most, the view is left out without
@@ -411,15 +411,15 @@ def without_strays(tracks: Sequence[Floats], rig: Rig) -> tuple[list[Floats], Bo
     def off(views: Sequence[Floats]) -> Floats:
         return np.fmax.reduce([np.hypot(*part.T) for part in missed(rig.cameras, views)])
 
-    whole, strays = off(views), np.zeros((len(views[0]), len(views)), dtype=bool)
+    whole, outliers = off(views), np.zeros((len(views[0]), len(views)), dtype=bool)
     limit = max(8.0 * float(np.nanmedian(whole)), GROSS)
     rows = np.flatnonzero(whole > limit)
     if 10 * len(rows) <= np.isfinite(whole).sum():  # the share that `disagreement` leaves aside
         ways = range(len(views))
         left = [off([np.where(k == i, np.nan, views[k][rows]) for k in ways]) for i in ways]
         agree = np.array(left) <= limit
-        strays[rows] = np.where(agree.sum(axis=0) == 1, agree, True).T
-    return [np.where(strays[:, [i]], np.nan, track) for i, track in enumerate(tracks)], strays
+        outliers[rows] = np.where(agree.sum(axis=0) == 1, agree, True).T
+    return [np.where(outliers[:, [i]], np.nan, track) for i, track in enumerate(tracks)], outliers
 
 
 def check_seen(tracks: Sequence[Floats], rig: Rig) -> list[Floats]:
