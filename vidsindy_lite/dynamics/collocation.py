@@ -26,6 +26,7 @@ from .library import Function, law_terms, linearised
 
 #: Least noise, relative to the spread of the data, that the splines are trusted to resolve.
 CLEANEST = 1e-5
+BLOCK = 16
 
 
 @dataclass(frozen=True)
@@ -368,13 +369,14 @@ class Collocation:
         response = physics.T @ unknowns
         response[:, 0] += (self.grid.samples.T @ (data_residual * self.sample_weights)).ravel()
         response[:, 1 + len(columns) :] = self._pull
-        response = cho_solve_banded((factor, True), response, check_finite=False)
-        response = np.negative(response, order="C")  # as sparse products want it
-
         objective = (data_residual**2 * self.sample_weights).sum()
         objective += (unknowns[:, 0] ** 2).sum()
         objective += sizes @ sizes
-        unknowns += physics @ response
+        # A few columns at once: of long data, each copy of all of them is large.
+        for first in range(0, response.shape[1], BLOCK):
+            some = slice(first, first + BLOCK)
+            response[:, some] = -cho_solve_banded((factor, True), response[:, some], False, False)
+            unknowns[:, some] += physics @ response[:, some]
         whole = self._gram(unknowns, response, data_residual)
         gram, shared = _without_systematic(whole, sizes)
         return WithCurve(

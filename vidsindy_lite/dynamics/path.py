@@ -334,7 +334,9 @@ def _restricted(path: Path, active: Bools) -> State:
     support = np.append(active.T.ravel(), state.moving)[model.columns]
     present = state.flat()[model.columns]
     solution = minimiser(model.information, model.gradient, present, support)
-    return model.along(state, solution - present, 1.0).of_terms(active)
+    flat = state.flat()
+    flat[model.columns] = solution
+    return state.moved(state.control_points, flat).of_terms(active)
 
 
 def polish(problem: Problem, fit: Fit, history: History, most: int = 16) -> Fit:
