@@ -252,7 +252,7 @@ rows = [row(name, observed, method) for name, observed in cases.items() for meth
 for entry in rows:  # so small a number says nothing but "rounding"
     entry |= {k: "below 1e-6" for k in tuple(entry)[2:5] if entry[k] < 1e-6}
 assert all(entry["error of scale"] == "below 1e-6" for entry in rows[:3])
-caption = "All three are exact on exact pixels; of one draw of noise none is the best in all."
+caption = "All three are exact on exact pixels; with errors they differ by a fraction of these."
 save_table("cameras_methods", rows, caption=caption)
 
 # %% [markdown]

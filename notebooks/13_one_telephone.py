@@ -64,8 +64,8 @@ g, size = 9.81, (960, 540) if full else (512, 288)
 # %% [markdown]
 # ## Two films
 #
-# We have no telephone here, so we draw what one would film: a red ball before a wall of bricks, at 30 frames a second,
-# compressed by H.264. The hand that holds the telephone trembles: the view wanders over the wall by some pixels.
+# We have no telephone here, so we draw what one would film: a red ball before a wall of bricks, at a telephone's
+# frame rate, compressed by H.264. The hand that holds the telephone trembles: the view wanders over the wall by some pixels.
 #
 # `place` says where a point of the plane, in metres, is seen in the first frame.
 
@@ -133,8 +133,9 @@ assert flight.discovery.system.support.sum() == 2 + 1  # x' = vx, y' = vy, y'' =
 assert abs(flight.g.value - g) < 4 * flight.g.error
 
 # %% [markdown]
-# Nothing pulls sideways, $\ddot x=0$, and $g$ pulls down. The error of $g$ is mostly that of the stick: one per
-# cent.
+# Nothing pulls sideways, $\ddot x=0$, and $g$ pulls down. The error of $g$ is not that of the parabola: the stick is known to
+# one per cent, and nobody knows whether the telephone looked straight at the plane of the motion. Two degrees askew change
+# lengths far from the marks by another per cent.
 
 # %% tags=["hide-input"] jupyter={"source_hidden": true}
 def draw(axes, film, found):

@@ -27,9 +27,14 @@ BLANK = "# Your code here: set "
 
 
 def names(source: str, context: type[ast.expr_context]) -> set[str]:
-    """Names that a cell sets (`ast.Store`), also by def, or reads (`ast.Load`)."""
+    """Names that a cell sets (`ast.Store`), also by def, or reads (`ast.Load`).
+
+    Not those that are of a comprehension in it alone.
+    """
     nodes = list(ast.walk(ast.parse(source)))
-    found = {n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, context)}
+    inner = {n.target for n in nodes if isinstance(n, ast.comprehension)}
+    own = {n.id for target in inner for n in ast.walk(target) if isinstance(n, ast.Name)}
+    found = {n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, context)} - own
     defined = {n.name for n in nodes if isinstance(n, ast.FunctionDef)}
     return found | (defined if context is ast.Store else set())
 

@@ -46,7 +46,7 @@ for step, fewer in laws.items():
 
 # %%
 assert set(laws) == {2, 4, 8}, "not yet: three steps"
-assert len({one.coefficients.tobytes() for one in laws.values()}) == 3, "not yet: three samples"
+assert len({one.coefficients.tobytes() for one in laws.values()}) == 3, "not yet: three different laws"
 assert all(score(one, truth).exact for one in laws.values()), "not yet"
 print("right")
 

@@ -57,7 +57,7 @@ print("right")
 # holds with $\vartheta$ changed by $\varphi$. The convention is free, but every part of a program has to share one.
 
 # %% [markdown]
-# **2.** (Explore.) Cameras look down with the normals $(10^{-6},0,-1)$, $(-10^{-6},0,-1)$ and $(0,10^{-6},-1)$,
+# **2.** (Explore.) Cameras below the scene look up, with the normals $(10^{-6},0,-1)$, $(-10^{-6},0,-1)$ and $(0,10^{-6},-1)$,
 # nearly the same. Which of their matrices `cameras.rotation_to_z(n)` are nearly the same, too? Set `answer`: `"a"`
 # all of them, `"b"` none, `"c"` the first two, `"d"` the last two.
 

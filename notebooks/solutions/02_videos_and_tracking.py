@@ -45,7 +45,7 @@ def errors_of(places, **scene):
 
 # %% [markdown]
 # **1.** (Explore.) With noise, `noise_variance=0.01`: which target is tracked best, one with `size=8`, 16 or 40
-# pixels? Set `answer` to its size, as a number. (`errors_of(round_trip, size=8, noise_variance=0.01)` renders, tracks
+# pixels? Set `answer` to its size, an integer. (`errors_of(round_trip, size=8, noise_variance=0.01)` renders, tracks
 # and compares.)
 
 # %% tags=["solution"]
@@ -64,15 +64,17 @@ print("right")
 
 # %% [markdown]
 # **2.** (Explore.) What if the target hardly moves? Let a target of 20 px go round on circles with a radius of 0.3
-# and of 0.7 times its width, without noise. Which of the two shares is tracked to a twentieth of a pixel in every
-# frame that shows it? Set `answer` to it.
+# and of 0.7 times its width, without noise. With which of the two shares is the target tracked more exactly, in the
+# worst of its frames? Set `answer` to it, as a number.
 
 # %% tags=["solution"]
+worst = {}
 for share in (0.3, 0.7):
     circle = 128 + share * 20 * np.column_stack([np.cos(angle), np.sin(angle)])
     off = errors_of(circle, size=20)
-    print(f"{share}: seen in {np.isfinite(off).mean():.0%} of the frames, off by at most {np.nanmax(off):.3f} px")
-assert np.nanmax(off) < 0.05
+    worst[share] = np.nanmax(off)
+    print(f"{share}: seen in {np.isfinite(off).mean():.0%} of the frames, off by at most {worst[share]:.3f} px")
+assert worst[0.7] < worst[0.3] / 2
 answer = 0.7
 
 # %%
@@ -82,8 +84,8 @@ print("right")
 # %% [markdown] tags=["solution"]
 # The target never leaves its place on the smaller circle: the median takes its middle for background, and what
 # differs from that are slivers. `track` notices, puts the ground that is seen around the place beneath it, and
-# follows what then differs; as that ground is a guess, it is off by some hundredths of a pixel, or tenths. On the
-# larger circle every frame is as exact as ever.
+# follows what then differs; as that ground is a guess, it is off by a hundredth of a pixel or some. On the larger
+# circle every frame is as exact as ever.
 
 # %% [markdown]
 # **3.** (Prove.) The centroid of a disc is exact if its coverage of every pixel is. Why, and what does an 8-bit

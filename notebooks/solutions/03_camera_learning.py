@@ -75,6 +75,7 @@ off = np.sqrt(np.mean((two - x) ** 2))
 assert off < pixel, "not yet"
 three = reconstruct(tracks, learn_cameras(tracks, start))
 assert not np.allclose(two, three), "not yet: these are three cameras"
+assert not np.allclose(two, x), "not yet: this is the truth"
 print(f"off by {off / pixel:.2f} px; with three cameras {np.sqrt(np.mean((three - x) ** 2)) / pixel:.2f} px")
 print("right")
 

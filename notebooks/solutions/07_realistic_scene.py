@@ -49,6 +49,7 @@ print(score(learned, truth), score(known, truth), sep="\n")
 # %%
 assert score(known, truth).exact, "not yet"
 assert not np.array_equal(known.coefficients, learned.coefficients), "not yet: the cameras were learned"
+assert not np.array_equal(known.coefficients, discover(t, x).coefficients), "not yet: not of the tracks"
 assert max(score(one, truth).l2 for one in (known, learned)) < 0.01
 print("right")
 

@@ -55,7 +55,7 @@ def rms(error):
 
 # %% [markdown]
 # **1.** (Explore.) A ball is seen as an ellipse, whose centre is not quite the image of the ball's centre:
-# `camera.ball_image(x, radius)[0]`. Learn the cameras from these centres, without noise, for a ball of 57.15 mm, and
+# `camera.ball_image(x, radius)[0]`. Learn the cameras from these centres, without noise, for a ball 57.15 mm across, and
 # reconstruct. How far is the path off? Set `answer`: `"a"` below 0.1 mm, `"b"` 0.1 to 1 mm, `"c"` more.
 
 # %% tags=["solution"]

@@ -59,7 +59,7 @@ possible = [(hits, false) for hits in range(1, 12) for false in range(50) if pri
 print(possible)
 
 # %%
-assert crc32(f"10.1 {possible}".encode()) == 4205841709, "not yet"
+assert crc32(f"10.1 {sorted((int(a), int(b)) for a, b in possible)}".encode()) == 4205841709, "not yet"
 print("right")
 
 # %% [markdown] tags=["solution"]

@@ -43,7 +43,8 @@ for rtol, law in told.items():
 answer = max(rtol for rtol, law in told.items() if score(law, flow).exact)
 
 # %%
-assert answer == max(rtol for rtol, law in told.items() if score(law, flow).exact), "not yet"
+assert score(told[answer], flow).exact, "not yet: other terms"
+assert not any(score(told[rtol], flow).exact for rtol in told if rtol > answer), "not yet: one is coarser"
 assert score(told[1e-6], flow).l2 < 1e-3, "not yet: the finest"
 print("right")
 
@@ -82,6 +83,7 @@ print(f"{score(law, flow)}; {law.status}")
 zone, steps = 0.01 * np.ptp(clean, axis=0), np.abs(np.diff(held, axis=0))
 assert (np.abs(held - clean) <= zone + 1e-12).all(), "not yet: too far from the path"
 assert ((steps == 0) | (steps >= zone - 1e-12)).all(), "not yet: smaller steps than the zone"
+assert (held[1:][np.abs(clean[1:] - held[:-1]) >= zone] == clean[1:][np.abs(clean[1:] - held[:-1]) >= zone]).all(), "not yet: beyond the zone it follows at once"
 assert law.coefficients.shape[1] == 3, "not yet: the law"
 print("right")
 

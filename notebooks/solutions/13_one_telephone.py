@@ -79,15 +79,15 @@ print("right")
 # %% [markdown]
 # **3.** (Explore.) Film a stone that sinks in water: its acceleration is $9.81\,(1-\rho_w/\rho)$ and the water takes
 # its speed with a drag of 3 per second. Simulate places for 0.9 s, from rest, for a stone with $\rho=2.5\,\rho_w$,
-# draw the film as above, but with `"pool.mkv"`, and name what `discover_from_video` finds `sunk`. What is the law,
-# and what does its `status` say?
+# draw the film as above, but with `"pool.mkv"` and from high enough in the picture (`[60, 50]` in place of `[60,
+# 330]`), and name what `discover_from_video` finds `sunk`. What is the law, and what does its `status` say?
 
 # %% tags=["solution"]
 pull, drag = 9.81 * (1 - 1 / 2.5), 3.0
 depth = pull / drag * (t - (1 - np.exp(-drag * t)) / drag)
-places = np.column_stack([0.3 + 0 * t, 1.4 - depth])
+places = np.column_stack([0.3 + 0 * t, -depth])
 pool = f"{folder.name}/pool.mkv"
-render_video(pool, [60, 330] + metre * places * [1, -1], Scene("bricks", image_size=(640, 360)), fps, seed)
+render_video(pool, [60, 50] + metre * places * [1, -1], Scene("bricks", image_size=(640, 360)), fps, seed)
 sunk = discover_from_video(pool, length=stick)
 print(sunk, sunk.status, sep="\n")
 
