@@ -194,8 +194,9 @@ for name, value, error in zip("xyz", law.offset, law.offset_errors, strict=True)
     print(f"offset along {name}: {value:.7f} ± {error:.7f}")
 
 # %% [markdown]
-# The true offset is (10, 10, 0). In the native frame, around that origin, fewest terms are left; the
-# shift of a polynomial is exact, so the one law follows from the other.
+# The true offset is (10, 10, 0). An axis along which no term becomes superfluous stays where it was, and
+# has no error. In the native frame, around that origin, fewest terms are left; the shift of a polynomial
+# is exact, so the one law follows from the other.
 
 # %%
 fig = plots.plot_coefficients(law, shot.truth)
@@ -238,8 +239,8 @@ save_table("tour_score", rows, caption=caption)
 # ## What it is good for
 #
 # With a law one can compute what happens next. We start at the first frame and let the discovered law
-# and the true one run. The system is chaotic: two paths that differ in the sixth digit separate
-# exponentially, so a forecast ends sooner or later, whoever makes it. We call it good as long as the
+# and the true one run. Where a system is chaotic, as Lorenz' is, two paths that differ in the sixth digit
+# separate exponentially, so a forecast ends sooner or later, whoever makes it. We call it good as long as the
 # distance is below a tenth of the spread of the motion, and count in periods: the time in which the
 # motion typically comes near its start again, 100 frames of these videos.
 

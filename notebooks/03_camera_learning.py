@@ -486,7 +486,7 @@ apart = np.abs(found.discovery.coefficients - there)[kept] / found.discovery.sta
 print("coefficients in standard errors from the true ones:", *apart.round(1))
 assert apart.max() < 4
 size = np.sqrt(np.mean(np.sum(found.systematic**2, axis=(0, 2)))) / pixel
-print(f"what {len(found.systematic)} shared causes may add to the path: {size:.2f} px")
+print(f"what is not known of the cameras (`found.systematic`, {len(found.systematic)} causes) may move the path by {size:.2f} px")
 
 # %% [markdown]
 # ## How many pixels, how many cameras?
@@ -540,7 +540,7 @@ print(f"from 128 to 1024 pixels the law's error falls {law_error[3, 128] / law_e
 assert law_error[3, 128] > law_error[3, 1024]
 
 # %% [markdown]
-# *Twice the pixels halve the error of the path, and a further camera averages rounding away, slowly. The coefficients follow
+# *Twice the pixels halve the error of the path, and a further camera averages rounding away, slowly. The coefficients follow, roughly,
 # the path; the terms of the law hold from 128 x 128 pixels and from two cameras on, because all frames share them.*
 
 # %% [markdown]

@@ -70,7 +70,8 @@ full = profile == "full"
 jobs = 2 if full else 1  # two processes are not worth their start-up in the quick profile
 
 # %% [markdown]
-# The data of this notebook: the Lorenz system in the reference frame, 100 samples a period, 10 % noise.
+# The data of this notebook: the Lorenz system in the reference frame, 100 samples a period, noise of a
+# share `level` of each coordinate's spread.
 
 # %%
 native = SYSTEMS["Lorenz"]
@@ -167,7 +168,7 @@ assert np.allclose(slopes @ P, slopes @ (P + offset), atol=1e-9)
 moved = native.shift(offset)
 point = clean[:5]
 assert np.allclose(native(point - offset), moved(point))
-print("terms:", native.support.sum(), "at its own origin,", moved.support.sum(), "10 units away")
+print("terms:", native.support.sum(), "at its own origin,", moved.support.sum(), "at the other")
 assert (native.support.sum(), moved.support.sum()) == (7, 12)
 
 # %% [markdown]
@@ -340,7 +341,7 @@ save_figure("solver_curve", fig, caption=caption, numbers=samples | curves | che
 # not. Below: the law holds at the nodes (ticks), and between them as well as cubic pieces can do it. Nodes
 # elsewhere would ask the pieces for what they cannot do, and penalise the true law for it.*
 #
-# Does it matter? Give the fit the right terms and nothing to search, three samples a knot span and 10 % noise, and let
+# Does it matter? Give the fit the right terms and nothing to search, three samples a knot span and the same noise, and let
 # the law hold in the middles, or at random times as in the paper, or five times a span at even distances.
 
 # %%
@@ -401,7 +402,7 @@ axes.set(xscale="log", yscale="log", ylabel="l2 error of the law")
 axes.set_xlabel("tolerated residual of the law / speed (physics weight grows to the right)")
 axes.invert_xaxis()
 fig.legend(loc="outside upper center", ncols=3)
-caption = "Error of Lorenz' coefficients at 10 % noise against the physics weight, by the times at which the law has to hold."
+caption = f"Error of Lorenz' coefficients at {level:.0%} noise against the physics weight, by the times at which the law has to hold."
 save_figure("solver_nodes", fig, caption=caption, numbers=errors)
 
 # %% [markdown]
@@ -437,7 +438,7 @@ assert off(by_hand, inside) < 0.03
 
 # %%
 near = slice(100, 300)
-both = {"reconstructed": broken[near], "curve that obeys the law": bridged.curve(t[near])}
+both = {"samples": broken[near], "curve that obeys the law": bridged.curve(t[near])}
 fig = plots.plot_path(t[near], both, "not seen")
 caption = "Samples with a gap (grey), and the curve (blue) that the law of both sides carries across."
 numbers = {"t": t[near], "data": broken[near], "curve": bridged.curve(t[near])}
@@ -447,7 +448,7 @@ save_figure("solver_gap", fig, caption=caption, numbers=numbers)
 # %% [markdown]
 # *Samples with a gap (grey), and the curve (blue) that the law of both sides carries across.* By
 # hand it is an integration from the last sample on. `discover` does the same from the end of its curve, and spreads what
-# misses the other side over the way; where that is much, the gap stays open.
+# misses the other side over the way, so that the path has no jump there; where that is much, the gap stays open.
 #
 # ## Two optimisers
 #
@@ -696,8 +697,7 @@ save_slider("solver_weight_slider", {name: fig for name, (fig, _) in pairs.items
 #   <!-- by: np.abs(unmet(nodes)).max(); all(row[-1] > 30 * middles[-1] for row in others[1:]); figure solver_nodes -->
 # * *Alternation*: it pays, against terms picked once from a curve that does not know the law.
 #   <!-- by: misses["after twenty"] < misses["after one round"] / 3 -->
-# * *Gradient descent*: with a fixed weight of the law it stops at a compromise. Gauss-Newton needs tens of steps in
-#   place of thousands, and ends where the law holds.
+# * *Gradient descent*: with a fixed weight of the law it stops at a compromise. Gauss-Newton ends where the law holds.
 #   <!-- by: last["Gauss-Newton"] < 1e-6 * last["spline-ADO"]; figure solver_history -->
 #
 # Next: [which terms are the law](04b_the_search.ipynb), and what its error bars are worth.

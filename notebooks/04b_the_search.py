@@ -67,7 +67,8 @@ full = profile == "full"
 jobs = 2 if full else 1  # two processes are not worth their start-up in the quick profile
 
 # %% [markdown]
-# The data are those of notebook 04: the Lorenz system in the reference frame, 100 samples a period, 10 % noise.
+# The data are those of notebook 04: the Lorenz system in the reference frame, 100 samples a period, noise of a share
+# `level` of each coordinate's spread.
 
 # %%
 native = SYSTEMS["Lorenz"]
@@ -170,7 +171,7 @@ for axes, (name, (values, threshold)) in zip(grid, panels.items(), strict=True):
     axes.plot(rank[hit], size[hit], "oC0", ms=7, label="true term")
     axes.plot(rank[~hit], size[~hit], "xC1", ms=7, mew=2, label="false term")
     if threshold is not None:
-        axes.axhline(threshold, color="k", ls="--", lw=1, label="penalty of a linear term")
+        axes.axhline(threshold, color="k", ls="--", lw=1, label="root of a linear term's penalty")
     axes.set(yscale="log", xlabel="rank", title=name, xlim=(0, len(values) + 1))
 fig.legend(*grid[1].get_legend_handles_labels(), loc="outside upper center", ncols=3)
 caption = "All terms by size, by size over error, and after the search, the true ones marked."
@@ -180,7 +181,7 @@ save_figure("solver_ranks", fig, caption=caption, numbers=numbers)
 
 # %% [markdown]
 # *Left: in the order of magnitude, true and false terms mix. Middle: in units of the standard error the
-# weakest true terms are below the penalty (dashed), because collinear columns share what they explain.
+# weakest true term is below the root of its penalty (dashed), because collinear columns share what they explain.
 # Right: after the search, with the impostors gone, the true terms stand out.*
 #
 # That is one draw of the noise. Here are more, and in how many of them each way leaves the true terms alone. A
@@ -425,10 +426,11 @@ if full:
 
 
 # %% [markdown]
-# *The sum of wrong terms has a flat minimum, and at the solver's price it is within a tenth of that. A term that is only just worth it may be
-# false: a law is compared with its rivals at a dearer price, of a chance of 0.4 %, and a term that is not worth that is told.
-# Here errors are independent. Errors that all samples share, such as those of cameras, look like evidence for small terms; where
-# there are any, every term costs the dearer price.*
+# *Some false terms come at any price: they take the place of true ones that are too dear. The sum of wrong terms has a flat
+# minimum, and at the solver's price it is within a tenth of that. A term that is only just worth it may be false: a law is
+# compared with its rivals at a dearer price, of a chance of 0.4 %, and a term that is not worth that is told. Here errors are
+# independent. Errors that all samples share, such as those of cameras, look like evidence for small terms; where there are
+# any, every term costs the dearer price.*
 #
 # ## Errors that are no noise
 #
@@ -563,7 +565,7 @@ assert found.native.support.sum() < found.system.support.sum()
 
 # %%
 draws, part, noise = (24, 500, 0.05) if full else (3, 300, 0.05)
-axes_moved = np.array([True, True, False])
+axes_moved = np.array([True, True, False])  # along z the origin is where it was
 sigma = noise * clean[:part].std(axis=0)
 bound = cramer_rao_bound(native, t[:part], native.x0, sigma, moving=axes_moved)
 

@@ -277,8 +277,7 @@ def _observed(
                 affine = _concluded(raw, tracks, far.rig, far.lags, clock, [], warnings, far.places)
                 if len(far.variance) < 3:  # parallel projections of a plane tell of no lens
                     return affine
-                least = max(cameras.BETTER * far.lags.residual, cameras.DISAGREEMENT / 2)
-                most = min(least, cameras.GROSS)
+                most = min(most, far.lags.residual)
             try:
                 rig = cameras.posed(films.aligned, rig, lags is not None, most)
             except ValueError:
@@ -314,9 +313,9 @@ def _observed(
             said = (left_out(name, why, rows) for name, rows in each)
             learned = noted(cameras.learn_cameras(cleared, rig), *said)
     missed = cameras.disagreement(tracks, learned)
-    if affine is not None:  # pinholes that leave more than parallel projections are none
+    if affine is not None:  # pinholes are more unknowns than parallel projections
         left = max(cameras.disagreement(affine.tracks, affine.rig), default=0.0)
-        if max(missed) > max(cameras.BETTER * left, cameras.DISAGREEMENT):
+        if cameras.BETTER * max(missed) > left:
             return affine
     if lags is not None:
         told = replace(told, residual=max(missed))

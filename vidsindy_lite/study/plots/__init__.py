@@ -290,7 +290,7 @@ def plot_path(
     curves : dict of str to ndarray, shape (n, 3) or (n, 2)
         Positions by what they are: scene units; NaN where there is none.
     missing : str
-        What the times are called, which are shaded, at which ``"reconstructed"`` is NaN.
+        What the times are called, which are shaded, at which a curve is NaN.
     styles : sequence of dict
         Of the lines, in this order.
     unit : str
@@ -306,7 +306,7 @@ def plot_path(
     for i, name in enumerate(names):
         axes = panels[name]
         if missing:
-            lost = np.isnan(curves["reconstructed"]).any(axis=1)
+            lost = np.isnan(np.hstack([*curves.values()])).any(axis=1)
             at = {"step": "mid", "transform": axes.get_xaxis_transform()}
             axes.fill_between(t, 0, 1, where=lost, color="0.85", **at)
         for curve, style in zip(curves.values(), styles, strict=True):
