@@ -514,7 +514,8 @@ save_figure("detector_tracks", fig, caption=caption, numbers=dict(zip(names, fla
 # %% [markdown]
 # *One frame of each restless video, with the track that `auto` found. `track` first takes out how the
 # background itself moves, then follows what still moves from frame to frame: that is more exact than the
-# learned detector, which sees one frame at a time.*
+# learned detector, which sees one frame at a time. Where an irregular outline changes so much that half a
+# target could not be told from a whole one, a warning says so.*
 
 # %% [markdown]
 # ## Gaps

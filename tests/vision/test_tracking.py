@@ -109,8 +109,9 @@ def circle(radius, n=150):
     return [120, 90] + radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def test_a_target_that_hardly_leaves_its_place_is_followed_at_its_middle(tmp_path):
-    truth, size = circle(2, 60), 18
+@pytest.mark.parametrize("radius", [2, 4])
+def test_a_target_that_hardly_leaves_its_place_is_followed_at_its_middle(tmp_path, radius):
+    truth, size = circle(radius, 60), 18
     found = tracked(tmp_path, truth, "sea", size, 2)
     box = Hint(frame=10, box=(*(truth[10] - size / 2), size, size))
     for one in (found, track(tmp_path / "clip.mov", target=box)):

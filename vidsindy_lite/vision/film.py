@@ -167,7 +167,7 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
         others = sighted(film, covered, bare=bare)
         plainer = _paths(others[0], hint, seed)
         # A path that is far less plain there is of what was taken out in its place.
-        if plainer and plainer[0].rating >= 0.5 * paths[0].rating:
+        if plainer and _worth(others[0], plainer[0]) >= 0.5 * _worth(seen, paths[0]):
             (seen, lights), paths = others, plainer
     rows = paths[0].rows if paths else np.zeros(0, int)
     start = seed or _plainest(seen, rows)
@@ -280,16 +280,29 @@ def _rivals(paths: Sequence[Motion]) -> Sequence[Motion]:
     return [path for path in paths[1:] if path.rating > 0.5 * paths[0].rating]
 
 
+def _worth(seen: Candidates, path: Motion) -> float:
+    """How plain a path is, however far it travels: parts of a whole may travel farther."""
+    return float(seen.quality[path.rows].sum())
+
+
 def _covering(film: Film, seen: Candidates, rows: Ints, seed: Spot | None) -> Floats | None:
     """Boxes (n, 4) of a target that covers its own ground in many frames, None if it does not."""
-    centre, size = seen.centre[rows], seen.box[rows, 2:]
+    at, low, high = seen.frame[rows], seen.box[:, :2], seen.box[:, :2] + seen.box[:, 2:]
+    first, last = np.full((2, len(film.maps), 2), np.nan)
+    first[at], last[at] = low[rows], high[rows]
+    # Before ground that shows it, it is two crescents, where it is and where it was: of both.
+    beside = ((low <= last[seen.frame]) & (first[seen.frame] <= high)).all(axis=1)
+    np.minimum.at(first, seen.frame[beside], low[beside])
+    np.maximum.at(last, seen.frame[beside], high[beside])
+    centre, size = (first + last)[at] / 2, (last - first)[at]
+    size = np.maximum(size, np.median(size, axis=0))  # it may be seen in part
     # The median of the samples does not show what is in one or two of them.
-    if np.isin(film.sampled, seen.frame[rows]).sum() < 3 or _staying(centre, size) < 0.35:
+    if np.isin(film.sampled, at).sum() < 3 or _staying(centre, size) < 0.35:
         return None
-    boxes = np.full((len(film.maps), 4), np.nan)
-    boxes[seen.frame[rows]] = seen.box[rows]
     if seed is not None:  # its size is told
-        boxes[seen.frame[rows]] = np.column_stack([centre - seed.size / 2, 0 * centre + seed.size])
+        size = 0 * size + seed.size
+    boxes = np.full((len(film.maps), 4), np.nan)
+    boxes[at] = np.hstack([centre - size / 2, size])
     return boxes
 
 
