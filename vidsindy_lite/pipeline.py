@@ -270,21 +270,19 @@ def _observed(
     rig, affine = cameras.paced(rig, clock.rates), None
     if not rig.is_measured:
         with refusing("cameras", raw, names):
-            far, most = cameras.factorised(films, rig, lags is not None), cameras.GROSS
+            far = cameras.factorised(films, rig, lags is not None)
             if far is not None:
                 tracks = replace(films, lags=far.lags.frames).aligned
                 warnings = (*far.lags.warnings, *doubts)
                 affine = _concluded(raw, tracks, far.rig, far.lags, clock, [], warnings, far.places)
                 if len(far.variance) < 3:  # parallel projections of a plane tell of no lens
                     return affine
-                most = min(most, far.lags.residual)
             try:
-                rig = cameras.posed(films.aligned, rig, lags is not None, most)
+                rig = cameras.posed(films.aligned, rig, lags is not None)
             except ValueError:
                 if affine is None:
                     raise
                 return affine
-            doubts = (*rig.warnings, *doubts)
     first: list[str] = []
     if synchronous:
         best = Lags(films.lags, films.rates, films.lags, 0.0, clocks=films.uneven)

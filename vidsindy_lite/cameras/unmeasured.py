@@ -2,23 +2,21 @@
 
 Two pinholes that see the same points determine where they stand relative to each other, but for the
 unit of length (the essential matrix, by the five-point method); of the points that they see, any
-other camera's place follows. From far away, three images or more of a path are a linear map of it,
-which is factorised; that start and its mirror image in depth are tried as well. A focal length of
-which nothing is known is tried from long lenses to wide ones. From the starts with the smallest
-residuals all cameras, and their focal lengths as far as they are uncertain, are adjusted
-(`adjust`), and the best is taken.
+other camera's place follows. A focal length of which nothing is known is tried from long lenses to
+wide ones. From the starts with the smallest residuals all cameras, and their focal lengths as far
+as they are uncertain, are adjusted (`adjust`), and the best is taken.
 
 Nothing in the images tells the unit of length, nor how the rig stands in the room. So the first
 camera gives the axes, x to the right and y up in its image and z towards it; the middle of the path
 is the origin, and the distance from the first camera to the second is the unit. Handedness is told
-by perspective; where that is too weak, a warning says so.
+by perspective: pinholes have to explain the tracks better than parallel projections.
 
-Where even that leads to no rig, as of cameras far away whose frames were cut out: parallel
-projections of one path make a matrix of rank three of the centred tracks of all views, whatever the
-lenses, where the cameras stand, and which part of their frames was cut out; of rank two if the path
-lies in a plane, of rank one on a line. So the lags are those that leave least beyond the smallest
-rank that leaves about as little as three, and the path is known but for an affine map of space.
-What no such map changes is known: frequencies and dampings of a linear law.
+Where they do not, as of cameras far away, or of frames that were cut out: parallel projections of
+one path make a matrix of rank three of the centred tracks of all views, whatever the lenses, where
+the cameras stand, and which part of their frames was cut out; of rank two if the path lies in a
+plane, of rank one on a line. So the lags are those that leave least beyond the smallest rank that
+leaves about as little as three, and the path is known but for an affine map of space. What no such
+map changes is known: frequencies and dampings of a linear law.
 
 Hartley and Zisserman 2004, "Multiple View Geometry"; Nister 2004, PAMI 26 (five points); Tomasi and
 Kanade 1992, IJCV 9 (factorisation).
@@ -28,13 +26,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import chain, combinations, combinations_with_replacement, product
+from itertools import chain, combinations, product
 from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import polar
 from scipy.optimize import least_squares
 
 from ..arrays import Floats
@@ -54,7 +51,7 @@ _NOTE = (
 )
 
 
-def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True, most: float = GROSS) -> Rig:
+def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True) -> Rig:
     """The rig with places and directions found from tracks, if it has none.
 
     Parameters
@@ -65,19 +62,19 @@ def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True, most: fl
         See `Rig.is_measured`.
     synchronous : bool
         ... or but for small lags, which are then learned as well, and forgotten.
-    most : float
-        By how many pixels views may be apart.
 
     Raises
     ------
     ValueError
-        If the tracks do not tell where the cameras stand.
+        If the tracks do not tell where the cameras stand, or parallel projections, which have fewer
+        unknowns and either hand, explain them about as well.
     """
     if rig.is_measured:
         return rig
     check_views(tracks, rig)
     starts = sorted(_starts(tracks, rig), key=lambda start: start[0])
     footage, fits = Footage.of(tracks), []
+    most = min(GROSS, _left(footage, np.zeros(len(tracks)), range(len(tracks)), 3) / BETTER)
     for _, cameras in starts[:4]:
         # Known are the place of the first camera, and of all others only their lenses.
         errors = np.array([known_to(camera) for camera in cameras])
@@ -95,15 +92,15 @@ def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True, most: fl
         raise ValueError(
             "rig: the tracks must tell where the cameras stand, as nothing of it is measured, got "
             f"{left} (videos that do not start within a frame or two of each other, a focal length "
-            "that is far off, or a target that moves on a line or in a plane?)"
+            "that is far off, cameras too far away, a target that moves on a line or in a plane?)"
         )
-    return _framed(rig, best, any(_mirrored(best, fit) for fit in fits))
+    return _framed(rig, best)
 
 
 def _starts(
     tracks: Sequence[Floats], rig: Rig
 ) -> Iterator[tuple[float, tuple[PerspectiveCamera, ...]]]:
-    """Cameras by any pair, and as if far away, with each choice of unknown lenses.
+    """Cameras by any pair, with each choice of unknown lenses.
 
     And by how many pixels they miss the tracks; the first one is at home.
     """
@@ -118,7 +115,7 @@ def _starts(
             for lens, track in zip(lenses, views, strict=True)
         ]
         pairs = (_around(rays, lenses, pair) for pair in combinations(range(len(rays)), 2))
-        for poses in chain(*pairs, _far_away(rays, lenses)):
+        for poses in chain(*pairs):
             cameras = _homed(lenses, poses)
             misses = np.hstack(missed(cameras, views))
             seen = np.isfinite(misses)
@@ -175,47 +172,6 @@ def _around(
     yield [poses[k] for k in sorted(poses)]
 
 
-def _far_away(
-    rays: Sequence[Floats], cameras: Sequence[PerspectiveCamera]
-) -> Iterator[list[_Pose]]:
-    """Poses as if no camera were near: two, the mirror images of each other in depth.
-
-    Centred images are then a matrix M (2 m, 3) times the path, and M A holds the rows of scaled
-    rotations. With Q = A A', m1' Q m2 = 0 and m1' Q m1 = m2' Q m2 in each camera, linear in Q.
-    """
-    images = np.hstack([c.focal_length * seen for c, seen in zip(cameras, rays, strict=True)])
-    if np.isfinite(images).all(axis=1).sum() < _FEWEST:
-        return
-    middle, singular, axes = _spread(images)
-    motion = (singular[:3] * axes[:3].T).reshape(-1, 2, 3)
-    sizes = np.linalg.norm(motion, axis=(1, 2), keepdims=True)
-    if not sizes.all():  # nothing moves in some view
-        return
-    one, other = (motion / sizes).swapaxes(0, 1)
-    pairs = combinations_with_replacement(np.eye(3), 2)
-    basis = np.array([np.outer(a, b) + np.outer(b, a) for a, b in pairs])  # of such Q
-
-    def form(left: Floats, right: Floats) -> Floats:
-        """left' Q right of each camera, as a function of the parts of Q."""
-        return np.einsum("mi,kij,mj->mk", left, basis, right)
-
-    equations = np.vstack((form(one, other), form(one, one) - form(other, other)))
-    q = np.tensordot(np.linalg.svd(equations)[2][-1], basis, axes=1)
-    values, axes = np.linalg.eigh(q)
-    values = values * np.sign(values.sum())
-    # Of a motion in a plane, rounding leaves less than that of the third axis.
-    root = axes * np.sqrt(np.maximum(values, 1e-3 * values.max()))
-    for mirror in ([1, 1, 1], [1, 1, -1]):
-        poses = []
-        for rows, camera, centre in zip(
-            motion @ root * mirror, cameras, middle.reshape(-1, 2), strict=True
-        ):
-            (right, down), stretch = polar(rows, side="left")
-            shift = np.append(centre, camera.focal_length) / (np.trace(stretch) / 2)
-            poses.append((np.array([right, down, np.cross(right, down)]), shift))
-        yield poses
-
-
 def _homed(
     cameras: Sequence[PerspectiveCamera], poses: Sequence[_Pose]
 ) -> tuple[PerspectiveCamera, ...]:
@@ -227,18 +183,7 @@ def _homed(
     return tuple(camera.posed(turn, shift) for camera, turn, shift in each)
 
 
-def _mirrored(best: Adjustment, other: Adjustment) -> bool:
-    """Whether other cameras explain the tracks as well, by the mirror image of the path."""
-    left = [np.nansum(fit.weights[:, None] * fit.misses**2) for fit in (best, other)]
-    # Chi-squared by which the mirror image must be worse.
-    if left[1] - left[0] > 25.0 * best.noise**2:
-        return False
-    both = np.isfinite(best.points + other.points).all(axis=1)
-    x, y = (fit.points[both] - fit.points[both].mean(axis=0) for fit in (best, other))
-    return bool(np.linalg.det(x.T @ y) < 0)
-
-
-def _framed(rig: Rig, fit: Adjustment, mirrored: bool) -> Rig:
+def _framed(rig: Rig, fit: Adjustment) -> Rig:
     """The cameras around the middle of the path, the second one so far from the first as is known.
 
     They are as good as measured by eye: what the tracks tell is learned later.
@@ -249,11 +194,7 @@ def _framed(rig: Rig, fit: Adjustment, mirrored: bool) -> Rig:
     each = zip(fit.cameras, places, strict=True)
     first, *others = (replace(camera, position=place) for camera, place in each)
     loose = [replace(camera, position_error=distance, normal_error=45.0) for camera in others]
-    either_hand = (
-        "whether the path is the true one or its mirror image cannot be told, as the cameras are "
-        "too far away: measure roughly where they stand, or come closer"
-    )
-    return Rig((first, *loose), (either_hand,) if mirrored else (), _note(rig))
+    return Rig((first, *loose), note=_note(rig))
 
 
 def _note(rig: Rig) -> str:
