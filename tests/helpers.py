@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics.library import Library
-from vidsindy_lite.dynamics.solver import _solved, _Task
+from vidsindy_lite.dynamics.solver import _posed, _solved, _Task
 from vidsindy_lite.vision.candidates import Candidates
 
 REAL = Path(vl.__file__).parents[2] / "shared" / "real"
@@ -129,7 +129,7 @@ def solved(t, x, degree):
     measured = [(t, x)], [np.zeros((*x.shape, 0))], None
     names, library = tuple("xyz"[: x.shape[1]]), Library.polynomial(degree)
     task = _Task(measured, names, library, "learn", 0, False, np.inf)
-    return _solved(task, task.form(1))
+    return _solved(task, *_posed(task, task.form(1)))
 
 
 def filmed(motion, frames, lags, rates=(1, 1, 1), noise=0.05):

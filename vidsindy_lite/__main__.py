@@ -2,6 +2,7 @@
 
 import argparse
 import inspect
+import io
 import re
 import signal
 import sys
@@ -18,6 +19,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     # As they are written in one step, at the end; and until it is known which command it is.
     options = argparse.Namespace(typed={}, kept="files are as they were")
+    if isinstance(sys.stdout, io.TextIOWrapper):  # not every terminal knows all characters
+        sys.stdout.reconfigure(errors="replace")
     try:
         _parser().parse_args(arguments, options)
         return options.work(options)
@@ -167,10 +170,12 @@ def _discover(options: argparse.Namespace) -> int:
         if isinstance(refused, Stopped):
             raise KeyboardInterrupt(f"the tracks are kept beside {page}") from None
         raise ValueError(f"{refused}; the tracks are drawn in {page}") from None
-    # First the law: if the report cannot be written, it is not lost.
     lags = "" if alone else f"; lags of the videos: {list_lags(found.lags.frames)} frames"
-    print(f"{found}\nstatus: {found.status}{lags}", flush=True)
-    print(f"report: {write_report(found, videos, options.out, told)}")
+    try:
+        page = write_report(found, videos, options.out, told)
+    finally:  # if the report cannot be written, or nobody reads what is printed, it is not lost
+        print(f"{found}\nstatus: {found.status}{lags}", flush=True)
+    print(f"report: {page}")
     return 0 if found.status == "ok" else 1
 
 

@@ -317,6 +317,8 @@ def _observed(
             return affine
     if lags is not None:
         told = replace(told, residual=max(missed))
+    if len(raw) == 2:
+        learned = noted(learned, "two views do not show whether a camera was measured wrong")
     modes = cameras.systematic_errors(raw, rig, learned, told)
     disagreeing = _rig_warnings(missed, tracks, rig, learned, names, told.frames, best)
     warnings = (*first, *disagreeing, *learned.warnings, *doubts, *told.warnings)
@@ -367,14 +369,17 @@ def _several_observed(
     long = Clock.of_tracks((np.append(t, t[-1] + step) + later).ravel()[:-1], rows)
     seen = _observed(rows, rig, long, 0 * begun, names, (*doubts, *who.doubts), progress)
     modes = [cameras.side_by_side(mode, count) for mode in seen.systematic]
+    x = cameras.side_by_side(seen.x, count)
+    lost = np.flatnonzero(np.isnan(x).any(axis=1))
     # The frames that its note names are those of the long track: it is left as it was given.
+    note = noted(rig, left_out("the paths", "as no two views tell all targets apart", lost)).note
     return replace(
         seen,
         tracks=tuple(cameras.side_by_side(track, count) for track in seen.tracks),
-        rig=cameras.paced(replace(seen.rig, note=rig.note), 1 / clock.rates),
+        rig=cameras.paced(replace(seen.rig, note=note), 1 / clock.rates),
         lags=replace(seen.lags, frames=begun, rates=clock.rates),
         t=t,
-        x=cameras.side_by_side(seen.x, count),
+        x=x,
         systematic=np.reshape(modes, (len(modes), len(t), 3 * count)),
     )
 

@@ -85,6 +85,7 @@ PARTS = {
 SIZE = 16
 STEPS = 60  #: That a search takes at most.
 _LARGEST = 50.0  # logarithm of a scale: a step that leads there is not taken
+_GROWN = 0.3  # logarithm of a scale, from which on a step that is linear in it tells nothing
 _OUTLIER = 6.0  # sigma
 _PRIOR_NOISE = 0.02  # pixels; no track is better than that beside a measurement
 _ENOUGH = 1e-7  # of sigma, by which a last step moves the images, or ...
@@ -531,14 +532,20 @@ def _evidence(near: Adjustment, free: Bools, wanted: Bools, far: bool) -> float:
     Where views are far apart, the pixels that it explains.
     """
     (rows, target, size), (missed, slopes) = near.system, near.weighed
+    scales = np.zeros(near.errors.shape, bool)
+    scales[:, PARTS["scale"]] = True
 
-    def left(told: Bools) -> Floats:
-        """What a step in some of the changes leaves of the residuals."""
+    def left(told: Bools) -> tuple[Floats, Floats]:
+        """The best step in some of the changes, and what it leaves of the residuals."""
         step = np.linalg.lstsq(rows[:, told], target, rcond=1e-10)[0] / size[told]
-        return missed + slopes[..., told] @ step
+        return step, missed + slopes[..., told] @ step
 
-    rest, seen = left(free | wanted), np.isfinite(near.misses)
-    after, saved = np.sum(rest**2), np.sum(left(free) ** 2) - np.sum(rest**2)
+    every, (_, known) = free | wanted, left(free)
+    step, rest = left(every)
+    if (np.abs(step[scales[near.free][every]]) > _GROWN).any():
+        return 0.0  # a larger scene hides what is wrong in it
+    seen = np.isfinite(near.misses)
+    after, saved = np.sum(rest**2), np.sum(known**2) - np.sum(rest**2)
     explained = float(np.sqrt(max(saved, 0.0) / seen.sum()))
     if far or explained < FINE:
         return explained if far else 0.0

@@ -215,6 +215,8 @@ class Camera(ABC):
             )
         if self.scale is not None and self.angle is not None:
             scale, angle = check_positive("scale", self.scale), check_number("angle", self.angle)
+            if abs(angle) > 4 * np.pi:
+                raise ValueError(f"angle: must be in radians, two turns at most, got {angle:g}")
             self._set(scale=scale, angle=angle)
         self._set(image_size=check_image_size(self.image_size))
         self._set(aspect=check_positive("aspect", self.aspect))

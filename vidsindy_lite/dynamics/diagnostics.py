@@ -570,7 +570,7 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
     if len(whole):
         yield from shapes(whole, noise, names[:measured])
         away = np.abs(whole.mean(axis=0)) / whole.std(axis=0)
-        for j in np.flatnonzero(away > 3e3).tolist():
+        for j in np.flatnonzero(away > 300).tolist():
             yield f"{names[j]} is {away[j]:.0g} times its spread from zero: subtract a constant"
     yield from differenced(names, problem.measured)
     x, _ = fit.collocation.node_states(fit.state.control_points)
@@ -598,11 +598,12 @@ def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:
         j = int(np.where(misses, ratio, 0.0).argmax())
         told = "sigma" if problem.measured_errors else "the noise estimated beforehand"
         times = f"{ratio[j]:.1f}" if ratio[j] <= 100 else "more than 100"  # that noise is none
+        small = "sigma may be too small, " if problem.measured_errors else ""
         yield (
             f"the curve misses the data of {names[j]} by "
             f"{residual[j] * problem.units.scale[j]:.3g} ({100 * residual[j]:.3g} % of its spread, "
-            f"{times} times {told}): errors may last for several samples, the law may lie outside "
-            "the library (raise the degree), or the motion may not be autonomous"
+            f"{times} times {told}): {small}errors may last for several samples, the law may lie "
+            "outside the library (raise the degree), or the motion may not be autonomous"
         )
     too_large = problem.noise / residual
     j = int(too_large.argmax())

@@ -171,7 +171,9 @@ class History:
         return not self.over
 
     def add(self, stage: str, fit: Fit) -> None:
-        """Add what a fit has reached."""
+        """Add what a fit has reached, and let the bar show the time."""
+        if self.bar is not None:
+            self.bar.update(0)
         state, collocation = fit.state, fit.collocation
         data = collocation.data_loss(state.control_points)
         self.steps.append(

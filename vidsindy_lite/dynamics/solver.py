@@ -182,7 +182,8 @@ def _oriented(task: _Task, found: Discovery) -> Discovery:
 
     def solved(turn: Floats) -> Solved:
         measured = in_axes(task.measured, turn)
-        law, problem, fit = _solved(replace(task, measured=measured), form)
+        moved = replace(task, measured=measured)
+        law, problem, fit = _solved(moved, *_posed(moved, form))
         return replace(law, orientation=turn), problem, fit
 
     paths, modes, errors = in_axes(task.measured, np.eye(len(task.names)))
@@ -200,8 +201,18 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     """The law of an order, or of the one that is to be trusted."""
     if order == "auto" and task.library.moving(task.names):
         order = 2  # who names a velocity means a law of motion
-    found, problem, fit = _solved(task, task.form(2 if order == 2 else 1))
-    if order == 1 or task.library.given:
+    problems, probes = _posed(task, task.form(2 if order == 2 else 1))
+    problem, whole, linear = problems[0], task.library.degree, None
+    given, timed = order == 1 or task.library.given, task.library.timed(task.names)
+    drowned = problem.noise.max() > 0.5  # a curve shows no accelerations
+    alone = order == "auto" and not (given or timed or drowned)
+    body = alone and accelerated(problem.curves)
+    if body and whole:
+        linear = _of_forces(task, 1)  # no law of first order holds: its search would be in vain
+        if linear and not linear.warnings and not _swing(task, problem, places=False):
+            return replace(linear, note="order 2: velocities are no function of the place")
+    found, problem, fit = _solved(task, problems, probes)
+    if given:
         return found
     if order == "auto" and driven_alone(problem, fit):
         doubt = (
@@ -212,8 +223,8 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     if order == "auto" and fit.state.active[1:].any() and len(task.names) == 1:
         # What only rises or falls on a line passes no place twice, or hardly: forces may pull it.
         # Linear ones without a constant pull also hold where the law of first order is linear.
-        linear = replace(task, library=Library.polynomial(1))
-        steady, exact, its = _solved(linear, linear.form(2))
+        simple = replace(task, library=Library.polynomial(1))
+        steady, exact, its = _solved(simple, *_posed(simple, simple.form(2)))
         less = information_criterion(problem, fit) - information_criterion(exact, its)
         if less > STRONG and its.state.active[0].any() and not exact.has_process_noise:
             return replace(
@@ -222,22 +233,22 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     if not found.warnings:
         return found
     swing = _swing(task, problem, order == 2)
-    drowned = problem.noise.max() > 0.5  # a curve shows no accelerations
     if swing or order == 2 or drowned:
         return replace(found, swing=swing)
     # With inputs a place is passed with several velocities, whatever the order is.
-    if not (found.system.timed or accelerated(problem.curves)):
-        return found
-    whole, second = task.library.degree, None
-    for degree in [1, whole] if whole and whole > 1 else [whole]:  # linear forces come first
-        simple = replace(task, library=replace(task.library, degree=degree))
-        try:
-            second, *_ = _solved(simple, simple.form(2))
-        except ValueError:  # too few samples for a law of so many terms, or its names are taken
-            break
-        if not second.warnings:
-            break
+    second = linear or (_of_forces(task, whole and 1) if body or timed else None)
+    if second and second.warnings and whole and whole > 1:
+        second = _of_forces(task, whole) or second
     return better(found, second) if second else found
+
+
+def _of_forces(task: _Task, degree: int | None) -> Discovery | None:
+    """The law of second order up to a degree; None of too few samples, or names that are taken."""
+    simple = replace(task, library=replace(task.library, degree=degree))
+    try:
+        return _solved(simple, *_posed(simple, simple.form(2)))[0]
+    except ValueError:
+        return None
 
 
 def _swing(task: _Task, problem: Problem, places: bool) -> Swing | None:
@@ -255,7 +266,8 @@ def _swing(task: _Task, problem: Problem, places: bool) -> Swing | None:
     form = Form.of((NAME,), LIBRARY, 2)
 
     def solved(angles: list[Trajectory], errors: list[Floats]) -> Discovery:
-        return _solved(replace(task, measured=(angles, errors, None)), form)[0]
+        turning = replace(task, measured=(angles, errors, None))
+        return _solved(turning, *_posed(turning, form))[0]
 
     try:
         return swinging(trajectories, shared, solved)
@@ -263,14 +275,18 @@ def _swing(task: _Task, problem: Problem, places: bool) -> Swing | None:
         return None
 
 
-def _solved(task: _Task, form: Form) -> Solved:
-    """The law of a form, the problem that it solves, and the last fit.
+def _posed(task: _Task, form: Form) -> tuple[list[Problem], np.random.Generator]:
+    """The problems whose solutions are laws of a form: the data, and what is known of their noise.
 
-    Prepare, path, infer, diagnose: the sections of the paper's method.
+    With `_solved`, prepare, path, infer, diagnose: the sections of the paper's method.
     """
     trajectories, shared, sigma = task.measured
     probes = np.random.default_rng(task.seed)
-    problems = views(lambda *how: pose(trajectories, shared, form, probes, sigma, *how))
+    return views(lambda *how: pose(trajectories, shared, form, probes, sigma, *how)), probes
+
+
+def _solved(task: _Task, problems: list[Problem], probes: np.random.Generator) -> Solved:
+    """The law, the problem that it solves, and the last fit."""
     # A first law, and one under process noise or at larger errors.
     rounds = 2 * (1 + ROUNDS) * len(problems)
     with bar(task.progress, "discover", total=rounds, leave=False) as shown_bar:
@@ -367,8 +383,9 @@ def accelerated(curves: Sequence[BSpline]) -> bool:
         for order in range(3)
     )
     linear = np.hstack([np.ones((len(x), 1)), x, v])
-    cubic = monomials(x, monomial_exponents(x.shape[1], 3))
-    several = unexplained(cubic, v)
+    # Terms, cubic ones at most, that do no more than interpolate would leave nothing.
+    whole = [monomial_exponents(x.shape[1], degree) for degree in (1, 2, 3)]
+    several = unexplained(monomials(x, [e for e in whole if 10 * len(e) <= len(x)][-1]), v)
     return several > 0.5 or (several > 0.005 and unexplained(linear, a) < 0.15)
 
 
