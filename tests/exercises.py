@@ -27,10 +27,7 @@ BLANK = "# Your code here: set "
 
 
 def names(source: str, context: type[ast.expr_context]) -> set[str]:
-    """Names that a cell sets (`ast.Store`), also by def, or reads (`ast.Load`).
-
-    Not those that are of a comprehension in it alone.
-    """
+    """Names that a cell sets (`ast.Store`) or reads (`ast.Load`), but for comprehensions."""
     nodes = list(ast.walk(ast.parse(source)))
     inner = {n.target for n in nodes if isinstance(n, ast.comprehension)}
     own = {n.id for target in inner for n in ast.walk(target) if isinstance(n, ast.Name)}

@@ -119,6 +119,17 @@ def test_from_tracks_to_a_report_and_back(tracked, capsys):
         assert one["coefficient"] == pytest.approx(other["coefficient"], rel=1e-4)
 
 
+def test_a_report_is_kept_though_nobody_reads_what_is_printed(tracked, monkeypatch):
+    def gone(*_, **__):
+        raise BrokenPipeError
+
+    monkeypatch.setattr("builtins.print", gone)
+    command = ["discover", "--rig", "rig.toml", "--fps", "25", "--degree", "2", "--tracks"]
+    with pytest.raises(BrokenPipeError):
+        main([*command, "a.csv", "b.csv", "c.csv"])
+    assert (tracked / "report" / "report.html").exists()
+
+
 def test_a_refusal_has_one_line_and_a_picture(tracked, capsys):
     command = ["discover", "--rig", "rig.toml", "--fps", "25", "--tracks"]
     assert main([*command, "a.csv", "b.csv", "c.csv", "--degree", "7"]) == 2

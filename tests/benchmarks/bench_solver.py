@@ -1,4 +1,4 @@
-"""The solver: time and memory, against the paper's optimiser and the Cramer-Rao bound; the tracker.
+"""The solver: time and memory, against the paper's optimiser; the tracker.
 
 Run with `make bench` on an otherwise idle machine (about half an hour). Every bar is a ratio taken
 in one run, or a time of the processor.
@@ -11,14 +11,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.dynamics import discover
-from vidsindy_lite.study import (
-    REFERENCE_OFFSET,
-    SYSTEMS,
-    add_noise,
-    cramer_rao_bound,
-    score,
-    spline_ado,
-)
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, score, spline_ado
 from vidsindy_lite.vision import BACKGROUNDS, Scene, read_video, render_video, track
 
 
@@ -95,30 +88,6 @@ def test_against_the_optimiser_of_the_paper():
     ratio = (reached[0] if reached else theirs) / ours
     note("paper's optimiser", "ratio" if reached else "at least", ratio, "ratio", "300")
     assert ratio >= 300
-
-
-@pytest.mark.parametrize("noise", [0.05, 0.1])
-def test_accuracy_against_the_cramer_rao_bound(noise):
-    moving, ratios, covered = np.array([True, True, False]), [], []
-    for name, system in SYSTEMS.items():
-        for seed in range(5):
-            _, t, x = measured(name, noise, seed=seed)
-            found = discover(t, x)
-            if not score(found.native, system).exact:
-                continue
-            spread = system.trajectory(1500)[1].std(axis=0)
-            bound = cramer_rao_bound(system, t, system.x0, noise * spread, moving)
-            on = system.support
-            error = (found.native.coefficients - system.coefficients)[on]
-            ratios.append(error / bound.coefficients[on])
-            covered.append(np.abs(error) <= 1.96 * found.native_standard_errors[on])
-    ratio = np.sqrt((np.concatenate(ratios) ** 2).mean())
-    coverage = 100 * np.concatenate(covered).mean()
-    note("Cramer-Rao", f"noise {noise:.0%}", ratio, "rms ratio", "1.5")
-    note("Cramer-Rao", f"noise {noise:.0%}", coverage, "% covered", "90-99")
-    note("Cramer-Rao", f"noise {noise:.0%}", np.concatenate(covered).size, "draws", "200")
-    assert ratio <= 1.5
-    assert 90 <= coverage <= 99
 
 
 @pytest.mark.parametrize("background", BACKGROUNDS)

@@ -57,6 +57,17 @@ def test_the_cause_is_named(what):
         assert "of cameras[3] (d.mp4) would explain it best" in told.warnings[0]
 
 
+def test_a_larger_scene_is_no_cause_though_it_hides_what_is_wrong_in_it():
+    x, rng = study.SYSTEMS["SprottF"].trajectory(400)[1], np.random.default_rng(0)
+    sides, size = np.array([[1, 0, 0.3], [-0.5, 0.9, 0.2], [-0.4, -0.9, 0.5]]), x.std()
+    middle, how = x.mean(axis=0), {"scale": 0.01 * size, "angle": 0.2}
+    views = [vl.OrthographicCamera(middle + 3 * size * n, n, **how) for n in sides]
+    tracks = [view.project(x) + 0.3 * rng.normal(size=(len(x), 2)) for view in views]
+    one, two, three = vl.Rig(views).uncalibrated(keep=0).cameras
+    rig = vl.Rig([one, replace(two, normal=two.normal + 2e-3 * two.rows[0]), three])
+    assert explain(tracks, rig, learn_cameras(tracks, rig)).what == "direction"
+
+
 @pytest.mark.parametrize("part", [{"distortion": (-0.15,)}, {"readout": 0.4}])
 def test_one_camera_is_blamed_where_all_would_explain_as_much(part):
     rng = np.random.default_rng([1, 7])

@@ -105,9 +105,6 @@ def test_from_infinity_either_hand_fits():
     tracks = shot(rng, rig, FRAMES)
     with pytest.raises(ValueError, match="cameras too far away"):
         vl.learn_cameras(tracks, blind(rig))
-    seen = observe_tracks(tracks, blind(rig), FRAMES / 30, lags=(0, 0, 0))
-    assert "affine" in seen.rig.note
-    assert seen.status == "ok"
 
 
 def test_a_file_of_lenses(tmp_path):

@@ -132,6 +132,14 @@ def test_auto_takes_the_second_order_for_a_body():
     assert "note: order 2" in str(found)
 
 
+def test_six_springs_have_their_law_though_cubics_interpolate_their_path():
+    t, rates = np.arange(500) / 25, np.array([2.3, 2.5, 2.7, 1.4, 1.7, 1.6])
+    found = discover(t, noisy(np.cos(np.outer(t, rates) + np.arange(6)), 1e-3))
+    assert found.note == "order 2: velocities are no function of the place"
+    assert len(found_terms(found.system)) == 6
+    assert found.status == "ok", found.warnings
+
+
 def test_a_law_outside_the_library_is_no_body():
     """Flows of one and two states (Gompertz, saturated growth, a pendulum and its rate)."""
     flows = {

@@ -85,7 +85,6 @@ PARTS = {
 SIZE = 16
 STEPS = 60  #: That a search takes at most.
 _LARGEST = 50.0  # logarithm of a scale: a step that leads there is not taken
-_GROWN = 0.3  # logarithm of a scale, from which on a step that is linear in it tells nothing
 _OUTLIER = 6.0  # sigma
 _PRIOR_NOISE = 0.02  # pixels; no track is better than that beside a measurement
 _ENOUGH = 1e-7  # of sigma, by which a last step moves the images, or ...
@@ -542,8 +541,8 @@ def _evidence(near: Adjustment, free: Bools, wanted: Bools, far: bool) -> float:
 
     every, (_, known) = free | wanted, left(free)
     step, rest = left(every)
-    if (np.abs(step[scales[near.free][every]]) > _GROWN).any():
-        return 0.0  # a larger scene hides what is wrong in it
+    if (np.abs(step[scales[near.free][every]]) > 0.3).any():
+        return 0.0  # a scene that is larger by a third hides what is wrong in it
     seen = np.isfinite(near.misses)
     after, saved = np.sum(rest**2), np.sum(known**2) - np.sum(rest**2)
     explained = float(np.sqrt(max(saved, 0.0) / seen.sum()))

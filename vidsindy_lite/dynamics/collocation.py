@@ -26,7 +26,6 @@ from .library import Function, law_terms, linearised
 
 #: Least noise, relative to the spread of the data, that the splines are trusted to resolve.
 CLEANEST = 1e-5
-BLOCK = 16
 
 
 @dataclass(frozen=True)
@@ -369,12 +368,11 @@ class Collocation:
         response = physics.T @ unknowns
         response[:, 0] += (self.grid.samples.T @ (data_residual * self.sample_weights)).ravel()
         response[:, 1 + len(columns) :] = self._pull
-        objective = (data_residual**2 * self.sample_weights).sum()
+        objective = (data_residual**2 * self.sample_weights).sum() + sizes @ sizes
         objective += (unknowns[:, 0] ** 2).sum()
-        objective += sizes @ sizes
         # A few columns at once: of long data, each copy of all of them is large.
-        for first in range(0, response.shape[1], BLOCK):
-            some = slice(first, first + BLOCK)
+        for first in range(0, response.shape[1], 16):
+            some = slice(first, first + 16)
             response[:, some] = -cho_solve_banded((factor, True), response[:, some], False, False)
             unknowns[:, some] += physics @ response[:, some]
         whole = self._gram(unknowns, response, data_residual)
