@@ -321,7 +321,7 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     Paper: Eq. (4); by itself it is `learn_cameras_eq4`.
     """
     check_learnable(rig)
-    given, rig = rig, posed(tracks, rig)
+    rig = posed(tracks, rig)
     views, seen = check_views(tracks, rig), check_seen(tracks, rig)
     errors = np.array([known_to(camera) for camera in rig.cameras])
     start = closed_form(views, rig.cameras)
@@ -333,7 +333,7 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     if not errors.any():
         return Rig(rig.cameras, note=rig.note)
     found = adjust(Footage.of(seen), start, errors)
-    doubts = () if rig is given else rig.warnings
+    doubts: tuple[str, ...] = ()
     if not found.settled:
         doubts += (
             f"the search for the cameras did not converge in {found.steps} evaluations: their "

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import chain, combinations, product
+from itertools import combinations, product
 from typing import Any, NamedTuple
 
 import cv2
@@ -114,9 +114,10 @@ def _starts(
             lens.centred(track) / lens.focal_length * [1, -1]
             for lens, track in zip(lenses, views, strict=True)
         ]
-        pairs = (_around(rays, lenses, pair) for pair in combinations(range(len(rays)), 2))
-        for poses in chain(*pairs):
-            cameras = _homed(lenses, poses)
+        for pair in combinations(range(len(rays)), 2):
+            cameras = _around(rays, lenses, pair)
+            if cameras is None:
+                continue
             misses = np.hstack(missed(cameras, views))
             seen = np.isfinite(misses)
             if seen.any():  # points that none can see are missed, too
@@ -134,19 +135,22 @@ def _lens(camera: PerspectiveCamera, view: float) -> PerspectiveCamera:
 
 def _around(
     rays: Sequence[Floats], cameras: Sequence[PerspectiveCamera], pair: tuple[int, int]
-) -> Iterator[list[_Pose]]:
-    """Poses of cameras around what two of them see; none if they tell nothing."""
+) -> tuple[PerspectiveCamera, ...] | None:
+    """The cameras around what two of them see, the first at home; None if they tell nothing.
+
+    The second is a unit from it.
+    """
     i, j = pair
     both = np.isfinite(rays[i]).all(axis=1) & np.isfinite(rays[j]).all(axis=1)
     if both.sum() < _FEWEST:
-        return
+        return None
     seen, centre = (rays[i][both], rays[j][both]), np.eye(3)
     essential, mask = cv2.findEssentialMat(
         *seen, centre, method=cv2.USAC_ACCURATE, prob=0.9999,
         threshold=GROSS / min(cameras[k].focal_length for k in pair),
     )  # fmt: skip
     if essential is None or essential.shape != (3, 3):
-        return
+        return None
     _, turn, shift, front, homogeneous = cv2.recoverPose(
         essential, *seen, centre, distanceThresh=50.0, mask=mask
     )
@@ -158,25 +162,18 @@ def _around(
     for k in set(range(len(cameras))) - set(pair):
         told = np.isfinite(points).all(axis=1) & np.isfinite(rays[k]).all(axis=1)
         if told.sum() < _FEWEST:
-            return
+            return None
         try:
             done, axis, place, _ = cv2.solvePnPRansac(
                 points[told], rays[k][told], centre, None, flags=cv2.SOLVEPNP_SQPNP,
                 reprojectionError=3 * GROSS / cameras[k].focal_length,
             )  # fmt: skip
         except cv2.error:  # points of one draw lie too close together
-            return
+            return None
         if not done:
-            return
+            return None
         poses[k] = np.asarray(cv2.Rodrigues(axis)[0]), np.asarray(place)[:, 0]
-    yield [poses[k] for k in sorted(poses)]
-
-
-def _homed(
-    cameras: Sequence[PerspectiveCamera], poses: Sequence[_Pose]
-) -> tuple[PerspectiveCamera, ...]:
-    """The cameras at poses of which the first is at home, and the second a unit from it."""
-    turns, shifts = map(np.array, zip(*poses, strict=True))
+    turns, shifts = map(np.array, zip(*(poses[k] for k in sorted(poses)), strict=True))
     turns = turns @ turns[0].T
     shifts = shifts - turns @ shifts[0]
     each = zip(cameras, turns * [1, -1, -1], shifts / np.linalg.norm(shifts[1]), strict=True)
