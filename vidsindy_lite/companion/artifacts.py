@@ -97,8 +97,10 @@ def save_figure(
         If something in `numbers` is none of the above.
     """
     record = _record(figure_id, "figure", caption, numbers, tolerance)
-    record["words"] = _words(figure)
-    _write(record, _png(figure))
+    # What is written in the figure, but for numbers: titles, labels, legends.
+    texts = dict.fromkeys(text.get_text() for text in figure.findobj(Text) if text.get_visible())
+    words = (text for text in texts if re.search(r"[^\W\d_]", re.sub(r"\\\w+", "", text)))
+    _write(record | {"words": [*words]}, _png(figure))
 
 
 def save_animation(
@@ -186,12 +188,6 @@ def _png(figure: Figure) -> bytes:
     image = io.BytesIO()
     figure.savefig(image, format="png", metadata={"Software": None})  # else it names the library
     return with_palette(image.getvalue())
-
-
-def _words(figure: Figure) -> list[str]:
-    """What is written in a figure, but for numbers: titles, labels, legends."""
-    texts = dict.fromkeys(text.get_text() for text in figure.findobj(Text) if text.get_visible())
-    return [text for text in texts if re.search(r"[^\W\d_]", re.sub(r"\\\w+", "", text))]
 
 
 # ------------------------------------------------------------------------------------------- tables

@@ -159,13 +159,13 @@ def physics_of(
             "nothing holds it at a place near the motion, or a force jumps there: no spring "
             "constants and no periods"
         ]
-    energy = [] if driven else body.energies(times, paths, rest)
+    energy = [] if driven else body.energies(law, times, paths, rest)
     return Physics(
         quantities=tuple(entry for entry in said if isinstance(entry, Quantity)),
         energy=tuple(energy),
         notes=(
             *(entry for entry in said if isinstance(entry, str)),
-            driven or _balance(energy, paths),
+            driven or body.balance(times, paths, rest),
         ),
     )
 
@@ -381,16 +381,39 @@ class _Body:
             why = "what is near rest leaves it" if leaves[j] else "it creeps back to rest"
             yield f"no period{labels[j]}: {'nothing pulls it back' if free[j] else why}"
 
+    def balance(self, times: Sequence[Floats], paths: Sequence[Floats], rest: Floats | None) -> str:
+        """How the energy changes along paths, by more than its errors and a share that is none."""
+        most = max(float((path[:, self.m :] ** 2).sum(axis=1).max()) for path in paths) / 2
+
+        def changes(law: PolynomialSystem) -> dict[str, Floats]:
+            levels = [pair[:, 1] / most for pair in self.energies(law, times, paths, rest)]
+            rises = [(level - np.minimum.accumulate(level)).max() for level in levels]
+            falls = [level[0] - level[-1] for level in levels]
+            return {"rise": np.max(rises, initial=0.0), "fall": np.max(falls, initial=0.0)}
+
+        if not self.energies(self.law, times, paths, rest):
+            return "the forces have no potential: no energy"
+        said, share = self.carried(changes), "of the largest kinetic energy"
+        (rise, rises), (fall, falls) = said["rise"], said["fall"]
+        if rise > (kept := max(1e-3, 3 * float(np.sqrt(rises[0, 0])))):
+            return (
+                f"the energy rises by {100 * rise:.3g} % {share}: it is driven, or a force is wrong"
+            )
+        if fall > max(1e-3, 3 * float(np.sqrt(falls[0, 0]))):
+            return f"the energy falls by {100 * fall:.3g} % {share}, and never rises"
+        return f"the energy is kept, to {100 * kept:.2g} % {share}"
+
     def energies(
-        self, times: Sequence[Floats], paths: Sequence[Floats], rest: Floats | None
-    ) -> list[Floats]:
+        self, law: PolynomialSystem, times: Sequence[Floats], paths: Sequence[Floats],
+        rest: Floats | None,
+    ) -> list[Floats]:  # fmt: skip
         """Times and energies along paths; none if the forces at rest have no potential.
 
         Their curl is then a twentieth of their gradients, which errors of coefficients do not make.
         """
 
         def still(places: Floats) -> tuple[Floats, Floats]:
-            return self.force(self.law, np.hstack([places, np.zeros_like(places)]))[:2]
+            return self.force(law, np.hstack([places, np.zeros_like(places)]))[:2]
 
         _, slopes = still(self.states[:, : self.m])
         twist = slopes - slopes.transpose(0, 2, 1)
@@ -427,22 +450,6 @@ def _diagonal(matrix: Floats) -> bool:
     """Whether nothing but rounding is beside the diagonal."""
     beside = matrix - np.diag(np.diag(matrix))
     return bool((np.abs(beside) <= FAINT * np.abs(matrix).max()).all())
-
-
-def _balance(energy: Sequence[Floats], paths: Sequence[Floats], kept: float = 1e-3) -> str:
-    """How the energy changes along paths, by more than a share that is none."""
-    if not energy:
-        return "the forces have no potential: no energy"
-    most = max(float((path[:, path.shape[1] // 2 :] ** 2).sum(axis=1).max()) for path in paths) / 2
-    levels = [pair[:, 1] / most for pair in energy]
-    rise = max(float((level - np.minimum.accumulate(level)).max()) for level in levels)
-    fall = max(float(level[0] - level[-1]) for level in levels)
-    share = "of the largest kinetic energy"
-    if rise > kept:
-        return f"the energy rises by {100 * rise:.3g} % {share}: it is driven, or a force is wrong"
-    if fall > kept:
-        return f"the energy falls by {100 * fall:.3g} % {share}, and never rises"
-    return f"the energy is kept, to {100 * kept:g} % {share}"
 
 
 # --------------------------------------------------------------------------------------------------

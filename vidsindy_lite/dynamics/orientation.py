@@ -175,7 +175,9 @@ def _turns(problem: Problem, state: State, step: float = 1e-4) -> Floats:
     """
     scale, law, changes = problem.units.scale, state.coefficients + problem.known, []
     whole, away = np.eye(problem.d), state.offset - problem.origin
-    for generator in _generators(_places(problem)):
+    # How axes change as they are `turned` back by a small angle about each.
+    back = np.cross(np.eye(3), np.eye(3)[:, None]).swapaxes(1, 2)
+    for generator in back if _places(problem) == 3 else back[2:, :2, :2]:
         copies = problem.d // len(generator)
         turn = step * np.kron(np.eye(copies), generator) * scale / scale[:, None]
         ahead, behind = (
@@ -193,12 +195,6 @@ def _mapped(
     y = np.random.default_rng(0).uniform(-1, 1, (3 * len(exponents), exponents.shape[1]))
     values = monomials(y @ inward.T + origin, exponents) @ laws @ outward.T
     return np.linalg.pinv(monomials(y, exponents)) @ values
-
-
-def _generators(m: int) -> Floats:
-    """How axes change as they are `turned` back by a small angle about each, (k, m, m)."""
-    back = np.cross(np.eye(3), np.eye(3)[:, None]).swapaxes(1, 2)
-    return back if m == 3 else back[2:, :2, :2]
 
 
 def _places(problem: Problem) -> int:

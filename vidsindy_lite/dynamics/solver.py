@@ -205,8 +205,7 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     problem, whole, linear = problems[0], task.library.degree, None
     given, timed = order == 1 or task.library.given, task.library.timed(task.names)
     drowned = problem.noise.max() > 0.5  # a curve shows no accelerations
-    alone = order == "auto" and not (given or timed or drowned)
-    body = alone and accelerated(problem.curves)
+    body = order == "auto" and not (given or timed or drowned) and accelerated(problem.curves)
     if body and whole:
         linear = _of_forces(task, 1)  # no law of first order holds: its search would be in vain
         if linear and not linear.warnings and not _swing(task, problem, places=False):

@@ -238,7 +238,8 @@ def _files(function: Callable, tasks: list) -> dict[int, Path]:
 
 
 def _store(file: Path, task: object, result: object) -> None:
-    content = json.dumps({"task": repr(task), "result": encoded(result, _place)})
+    value = encoded(result, lambda kind: f"{kind.__module__}:{kind.__qualname__}")
+    content = json.dumps({"task": repr(task), "result": value})
     try:
         write_file(file, f"{_digest(content)}\n{content}\n".encode())
     except OSError as error:  # such as a full disk, or a folder in its place
@@ -261,11 +262,6 @@ def _stored(files: Mapping[int, Path], tasks: list) -> dict[int, Any]:
 
 def _digest(content: str) -> str:
     return hashlib.sha256(content.encode()).hexdigest()
-
-
-def _place(kind: type) -> str:
-    """Where a dataclass of the package is defined."""
-    return f"{kind.__module__}:{kind.__qualname__}"
 
 
 def _built(place: str, parts: dict[str, Any]) -> Any:
