@@ -168,7 +168,8 @@ class WithCurve(Linearisation):
     Parameters
     ----------
     response : ndarray, shape (r d, 1 + m + s)
-        What the control points do by themselves, with each column, and each systematic error.
+        What the control points do by themselves, with each column, and each systematic error; empty
+        in `Problem.model`.
     shared : ndarray, shape (s, 1 + m)
         What the sizes of the systematic errors do by themselves, and with each column.
     gram : ndarray, shape (1 + m + s, 1 + m + s)
