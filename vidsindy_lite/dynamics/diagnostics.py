@@ -778,10 +778,10 @@ def _sampling(problem: Problem, fit: Fit, law: PolynomialSystem, remedy: str) ->
     if samples < 2 * np.pi:  # a step is longer than a time scale of the motion
         yield f"only {samples:.1f} samples per turn of the motion: sample faster"
     rates = np.linalg.eigvals(np.nan_to_num(problem.law(fit.state).gradient(x - fit.state.offset)))
-    grows = float(np.median(rates.real.max(axis=1))) * step
+    grows = min(float(np.median(rates.real.max(axis=1))) * step, 99.0)
     if grows > 1:
         yield (
-            f"from one sample to the next what is small grows {np.exp(grows):.0f}-fold in the law, "
+            f"from one sample to the next what is small grows {np.exp(grows):.2g}-fold in the law, "
             "which foretells none of them: sample faster, if it is the law at all"
         )
     coarse = problem.samples_a_turn < COARSE
