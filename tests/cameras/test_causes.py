@@ -61,7 +61,7 @@ def test_a_larger_scene_is_no_cause_though_it_hides_what_is_wrong_in_it():
     x, rng = study.SYSTEMS["SprottF"].trajectory(400)[1], np.random.default_rng(0)
     sides, size = np.array([[1, 0, 0.3], [-0.5, 0.9, 0.2], [-0.4, -0.9, 0.5]]), x.std()
     middle, how = x.mean(axis=0), {"scale": 0.01 * size, "angle": 0.2}
-    views = [vl.OrthographicCamera(middle + 3 * size * n, n, **how) for n in sides]
+    views = [vl.OrthographicCamera(position=middle + 3 * size * n, normal=n, **how) for n in sides]
     tracks = [view.project(x) + 0.3 * rng.normal(size=(len(x), 2)) for view in views]
     one, two, three = vl.Rig(views).uncalibrated(keep=0).cameras
     rig = vl.Rig([one, replace(two, normal=two.normal + 2e-3 * two.rows[0]), three])
