@@ -313,7 +313,7 @@ def _observed(
     missed = cameras.disagreement(tracks, learned)
     if affine is not None:  # pinholes are more unknowns than parallel projections
         left = max(cameras.disagreement(affine.tracks, affine.rig), default=0.0)
-        if cameras.BETTER * max(missed) > left:
+        if max(missed) * (cameras.BETTER if lags is None else 1.0) > left:  # and lags are more
             return affine
     if lags is not None:
         told = replace(told, residual=max(missed))

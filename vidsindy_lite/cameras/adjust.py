@@ -541,8 +541,8 @@ def _evidence(near: Adjustment, free: Bools, wanted: Bools, far: bool) -> float:
 
     every, (_, known) = free | wanted, left(free)
     step, rest = left(every)
-    if (np.abs(step[scales[near.free][every]]) > 0.3).any():
-        return 0.0  # a scene that is larger by a third hides what is wrong in it
+    if (np.abs(step[scales[near.free][every]]) > 0.3).sum() > 1:
+        return 0.0  # a scene that is larger by a third, in all scales, hides what is wrong in it
     seen = np.isfinite(near.misses)
     after, saved = np.sum(rest**2), np.sum(known**2) - np.sum(rest**2)
     explained = float(np.sqrt(max(saved, 0.0) / seen.sum()))

@@ -74,7 +74,9 @@ def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True) -> Rig:
     check_views(tracks, rig)
     starts = sorted(_starts(tracks, rig), key=lambda start: start[0])
     footage, fits = Footage.of(tracks), []
-    most = min(GROSS, _left(footage, np.zeros(len(tracks)), range(len(tracks)), 3) / BETTER)
+    parallel = _left(footage, np.zeros(len(tracks)), range(len(tracks)), 3)
+    # These must be worse by a chi-square of 25.
+    most = min(GROSS, parallel * float(np.exp(-12.5 / np.isfinite(tracks[0]).sum())))
     for _, cameras in starts[:4]:
         # Known are the place of the first camera, and of all others only their lenses.
         errors = np.array([known_to(camera) for camera in cameras])

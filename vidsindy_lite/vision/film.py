@@ -288,10 +288,18 @@ def _worth(seen: Candidates, path: Motion) -> float:
 def _covering(film: Film, seen: Candidates, rows: Ints, seed: Spot | None) -> Floats | None:
     """Boxes (n, 4) of a target that covers its own ground in many frames, None if it does not."""
     at, low, high = seen.frame[rows], seen.box[:, :2], seen.box[:, :2] + seen.box[:, 2:]
-    first, last = np.full((2, len(film.maps), 2), np.nan)
+    own = np.full(len(film.maps), -1)
+    own[at] = rows
+    k, (first, last) = own[seen.frame], np.full((2, len(film.maps), 2), np.nan)
     first[at], last[at] = low[rows], high[rows]
-    # Before ground that shows it, it is two crescents, where it is and where it was: of both.
-    beside = ((low <= last[seen.frame]) & (first[seen.frame] <= high)).all(axis=1)
+    # Before ground that shows it, it is two crescents, where it is and where it was: of both. Their
+    # colours, and those behind, are the target's and the ground's, or mixed of these.
+    ends = seen.colour[k], seen.behind[k]
+    mixed = [
+        sum(np.linalg.norm(x - end, axis=1) for end in ends) for x in (seen.colour, seen.behind)
+    ]
+    beside = np.max(mixed, axis=0) < 1.2 * np.linalg.norm(ends[0] - ends[1], axis=1)
+    beside &= (k >= 0) & ((low <= high[k]) & (low[k] <= high)).all(axis=1)
     np.minimum.at(first, seen.frame[beside], low[beside])
     np.maximum.at(last, seen.frame[beside], high[beside])
     centre, size = (first + last)[at] / 2, (last - first)[at]
