@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from unittest.mock import Mock
 
 import cv2
 import numpy as np
@@ -120,10 +121,7 @@ def test_from_tracks_to_a_report_and_back(tracked, capsys):
 
 
 def test_a_report_is_kept_though_nobody_reads_what_is_printed(tracked, monkeypatch):
-    def gone(*_, **__):
-        raise BrokenPipeError
-
-    monkeypatch.setattr("builtins.print", gone)
+    monkeypatch.setattr("builtins.print", Mock(side_effect=BrokenPipeError))
     command = ["discover", "--rig", "rig.toml", "--fps", "25", "--degree", "2", "--tracks"]
     with pytest.raises(BrokenPipeError):
         main([*command, "a.csv", "b.csv", "c.csv"])

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from helpers import moving, noisy
 from scipy.integrate import solve_ivp
+from scipy.interpolate import make_interp_spline
 
 from vidsindy_lite.dynamics import PolynomialSystem
 from vidsindy_lite.dynamics.library import Library
-from vidsindy_lite.dynamics.solver import better, discover
+from vidsindy_lite.dynamics.solver import accelerated, better, discover
 
 
 def duffing(x, v):
@@ -159,6 +160,7 @@ def test_what_cannot_be_of_second_order_stays_with_the_first():
     few = discover(t[:20], np.hstack([x[:20], x[20:40]]), degree=2)
     assert few.system.order == 1
     assert discover(t, x, library=Library.polynomial(3).where({"x": {"1": 0.0}})).system.order == 1
+    assert accelerated([make_interp_spline(t, np.cos(np.outer(t, 1 + np.arange(22) / 40)))])
 
 
 def test_a_fall_is_of_second_order_though_it_passes_no_place_twice():

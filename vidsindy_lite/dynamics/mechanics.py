@@ -160,12 +160,15 @@ def physics_of(
             "constants and no periods"
         ]
     energy = [] if driven else body.energies(law, times, paths, rest)
+    change = "the forces have no potential: no energy"
+    if energy:
+        change = body.balance(times, paths, rest)
     return Physics(
         quantities=tuple(entry for entry in said if isinstance(entry, Quantity)),
         energy=tuple(energy),
         notes=(
             *(entry for entry in said if isinstance(entry, str)),
-            driven or body.balance(times, paths, rest),
+            driven or change,
         ),
     )
 
@@ -391,8 +394,6 @@ class _Body:
             falls = [level[0] - level[-1] for level in levels]
             return {"rise": np.max(rises, initial=0.0), "fall": np.max(falls, initial=0.0)}
 
-        if not self.energies(self.law, times, paths, rest):
-            return "the forces have no potential: no energy"
         said, share = self.carried(changes), "of the largest kinetic energy"
         (rise, rises), (fall, falls) = said["rise"], said["fall"]
         if rise > (kept := max(1e-3, 3 * float(np.sqrt(rises[0, 0])))):

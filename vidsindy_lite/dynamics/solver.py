@@ -385,8 +385,8 @@ def accelerated(curves: Sequence[BSpline]) -> bool:
     # Cubic terms of more than three coordinates are so many that they may do no more than
     # interpolate, which leaves nothing: of these as many as a tenth of the points.
     whole = [monomial_exponents(x.shape[1], degree) for degree in (1, 2, 3)]
-    told = [exponents for exponents in whole if len(exponents) <= max(20, len(x) / 10)]
-    several = unexplained(monomials(x, told[-1]), v)
+    most = max(20, len(x) / 10, len(whole[0]))
+    several = unexplained(monomials(x, [e for e in whole if len(e) <= most][-1]), v)
     return several > 0.5 or (several > 0.005 and unexplained(linear, a) < 0.15)
 
 
