@@ -151,7 +151,10 @@ def test_a_refusal_has_one_line_and_a_picture(tracked, capsys):
         (["--tracks", "a.csv", "b.csv", "c.csv"], "t: must be given, or fps, as a.csv states no"),
         (["--tracks", "a.csv", "none.csv"], "tracks: no such file, got 'none.csv'"),
         (["--tracks", "1.csv", "1.csv", "1.csv", "--fps", "9"], "tracks: must have two frames or"),
-        (["--tracks", "a.csv", "--individual", "mouse"], "tracks: must name its targets, of which"),
+        (
+            ["--tracks", "a.csv", "--individual", "mouse"],
+            "tracks: must name the individual 'mouse'",
+        ),
     ],
 )
 def test_bad_tracks_are_told(tracked, capsys, options, message):

@@ -83,6 +83,17 @@ KINOVEA = (
         "0,10.25,20.5\n1,11,21\n2,,\n3,13,23\n",
         "frame;u;v\n0;10,25;20,5\n1;11;21\n2;;\n3;13,0;23,0\n",
         "Frame, X, Y\n0, 10.25, 20.5\n1, 11, 21\n3, 13, 23\n",
+        *(GAP.replace("frame", name) for name in ("", "Frame Number", "Frame #", "slice n°")),
+        GAP.replace("frame", "image").replace("10,", "v2/img10.png,").replace("7,", "v2/img7.png,"),
+        "# my detector v1\n" + OURS, "# my detector v1\n# " + OURS,
+        "frame,x,y,visible,by\n0,10.25,20.5,True,me\n1,11,21,True,me\n2,3,4,False,me\n3,13,23,True,me\n",
+        TRACKMATE.split("\nLabel")[0] + "\n" + TRACKMATE.split("(frame),\n")[1],
+        "frame,id,bb_left,bb_top,bb_width,bb_height,conf,x,y,z\n0,1,9.75,20,2,2,1,-1,-1,-1\n"
+        "1,1,10.5,20.5,2,2,1,-1,-1,-1\n3,1,12.5,22.5,2,2,1,-1,-1,-1\n",
+        "frame,x,y,left,top,w,h\n0,10.25,20.5,9,20,3,3\n1,11,21,9,20,3,3\n3,13,23,9,20,5,5\n",
+        "u,v,width,height\n10.25,20.5,9,20\n11,21,9,20\n,,,\n13,23,9,20\n",
+        "scorer,,,net,net\nbodyparts,,,ball,ball\ncoords,,,x,y\nlabeled,v2,img07.png,10.25,20.5\n"
+        "labeled,v2,img08.png,11,21\nlabeled,v2,img10.png,13,23\n",
     ],
 )  # fmt: skip
 def test_every_kind_is_read(tmp_path, text):
@@ -103,10 +114,13 @@ def test_every_kind_is_read(tmp_path, text):
 def test_one_of_several_targets_is_chosen_by_its_name(tmp_path, text, name):
     with pytest.raises(ValueError, match="must hold one target, got .* as individual"):
         read(tmp_path, text)
-    with pytest.raises(ValueError, match="must hold one target, got "):
-        read_tracks(tmp_path / "a.csv", "nobody")
+    for other in ("nobody", f"{name} nobody"):
+        with pytest.raises(ValueError, match="must (hold one target|name the individual .*), got "):
+            read_tracks(tmp_path / "a.csv", other)
     (track,) = read_tracks(tmp_path / "a.csv", name)
     np.testing.assert_allclose(track.pixels, PIXELS)
+    with pytest.raises(ValueError, match="must name the individual .7., got 8"):
+        read(tmp_path, "frame,id,x,y\n0,8,1,2\n1,8,2,3\n") and read_tracks(tmp_path / "a.csv", "7")
 
 
 def test_argus_counts_from_the_lower_left(tmp_path):
@@ -120,6 +134,14 @@ def test_boxes_say_so(tmp_path):
         (track,) = read(tmp_path, f"{head}\n{sides}\n{sides}\n")
         np.testing.assert_allclose(track.pixels, [[99.5, 199.5]] * 2)
         assert "the middles of its boxes are taken" in track.warnings[0]
+
+
+def test_a_column_that_may_count_frames_is_told(tmp_path):
+    assert (
+        "'bild', which rises from each"
+        in read(tmp_path, "bild,x,y\n0,1,2\n1,3,4\n5,5,6\n")[0].warnings[0]
+    )
+    assert read(tmp_path, "bild,x,y\n0,1,2\n1,3,4\n2,5,6\n")[0].warnings == ()
 
 
 def test_milliseconds_are_seconds_if_their_column_says_so(tmp_path):

@@ -88,6 +88,10 @@ class Function:
         """Whether it depends on the time alone."""
         return not self.axes
 
+    def at(self, t: Floats, d: int) -> Floats:
+        """Values of a function of the time alone at times (n,), of d variables."""
+        return self.value(np.repeat(t[:, None], d, axis=1))
+
     def gradient(self, x: Floats) -> Floats:
         """Derivatives at points (n, d), by differences of fourth order, (n, d)."""
         result = np.zeros_like(x)
@@ -318,6 +322,11 @@ def _curve(name: str, t: Floats, values: Floats, hold: str | None) -> tuple[BSpl
     if not np.isfinite(values).all():
         first = t[np.argmin(np.isfinite(values))]
         raise ValueError(f"inputs: {name} must be finite, got NaN or infinity at t = {first:g}")
+    if np.spacing(np.abs(t).max()) > 1e-7 * np.diff(t).min():
+        raise ValueError(
+            f"inputs: times of {name} must be told apart to a ten-millionth of their steps, got "
+            f"t = {t[0]:g}, ...: subtract the first time, of the states as well"
+        )
     degrees, unsure = {"zero": 0, "linear": 1, "cubic": min(3, len(t) - 1)}, np.zeros((0, 2))
     curves = {kind: make_interp_spline(t, values, degree) for kind, degree in degrees.items()}
     if hold is None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.integrate import DOP853
@@ -26,6 +26,7 @@ from ..checks import (
     check_vector,
     shown,
 )
+from .l0 import LEAST
 from .library import (
     CLOCK,
     Function,
@@ -33,6 +34,7 @@ from .library import (
     check_mapping,
     closure,
     extended,
+    jumps,
     law_terms,
     linearised,
     name_latex,
@@ -155,8 +157,8 @@ def integrate(
     """
     path = np.full((len(t), len(x0)), np.nan)
     path[0] = x = x0
-    step, span = float(np.diff(t[:2]).sum()), float(t[-1] - t[0])
-    steps, size = most_steps, float(np.abs(x0).max())
+    step, least = float(np.diff(t[:2]).sum()), 1e-15 * float(np.abs(t).max())
+    steps, size = most_steps, np.abs(x0) + LEAST
     for row, (now, end) in enumerate(zip(t[:-1].tolist(), t[1:].tolist(), strict=True), start=1):
         while now < end:
             last = step >= end - now
@@ -166,13 +168,16 @@ def integrate(
             taken = end - now if last else step
             with np.errstate(over="ignore", invalid="ignore"):  # of steps that are too long
                 moved, error = _step(rate, x, taken)
-            if not error < 1:
-                step = taken / 2
-                if step < 1e-13 * span:
+            change = np.abs(moved - x)
+            # Where the rate jumps, the shortest step misses by more than is tolerated, but hardly
+            # moves; at a pole it does.
+            if not (error < 1 or (taken <= least and (change < 1e-9 * (1 + np.abs(x))).all())):
+                if taken <= least:
                     return path, "diverges"
+                step = max(taken / 2, least)
                 continue
-            size = max(size, float(np.abs(moved).max()))
-            steps += 1000 * float(np.abs(moved - x).max()) / (size or 1.0)
+            size = np.maximum(size, np.abs(moved))
+            steps += 1000 * float((change / size).max())
             x, now = moved, end if last else now + taken
             if np.abs(x).max() > farthest:
                 return path, "diverges"
@@ -512,8 +517,18 @@ class PolynomialSystem:
         t = check_times(t)
         if self.timed and np.shape(x0) != (self.d,):
             x0 = np.append(check_vector("x0", x0, self.states), t[0])
-        x0 = check_vector("x0", x0, self.d)
-        self.check_inputs(x0[-1] + t - t[0])
+        x0, clock = check_vector("x0", x0, self.d), np.zeros(self.d)
+        inputs, since = self.inputs(), t - t[0]
+        if self.timed:
+            if abs(x0[-1] - t[0]) > 1e-6 * (since[-1] or 1.0):
+                raise ValueError(f"x0: its time must be that of t, {t[0]:g}, got {x0[-1]:g}")
+            x0[-1], clock[-1] = 0.0, t[0]  # counted from the first, times are exact
+        # What is known at all of them may be unknown between two.
+        self.check_inputs(np.union1d(t, np.linspace(t[0], t[-1], 1000)))
+        # A step ends just before an input jumps, and one just after.
+        at = [jumps(partial(one.at, d=self.d), t) - t[0] for one in inputs]
+        just = 2e-9 * np.diff(t).max(initial=0.0)
+        every = np.unique(np.concatenate([since, *at, *(np.maximum(one - just, 0) for one in at)]))
         fraction, size = bool(self.implicit.any()), self.d + len(self.functions)
         above, below = (
             one_by_one(self.exponents[rows, :size], self.coefficients[rows])
@@ -521,24 +536,31 @@ class PolynomialSystem:
         )
 
         def rate(x: Floats) -> Floats:
+            x = x + clock
             z = (extended(x[None], self.functions)[0] if self.functions else x).tolist()
             if not fraction:
                 return np.array(above(z))
             with np.errstate(divide="ignore", invalid="ignore"):  # at a pole the path ends
                 return np.array(above(z)) / (1 - np.array(below(z)))
 
-        return integrate(rate, t, x0, farthest=1e8 * (1 + np.abs(x0).max()))
+        farthest = 1e8 * (1 + np.abs(x0).max())
+        path, end = integrate(rate, every, x0, farthest)
+        return path[np.searchsorted(every, since)] + clock, end
+
+    def inputs(self) -> list[Function]:
+        """The functions of the time alone that the law has."""
+        used = self.exponents[self.support.any(axis=1), self.d :].sum(axis=0)
+        known = zip(self.functions, used.tolist(), strict=False)
+        return [function for function, times in known if function.of_time and times]
 
     def check_inputs(self, t: Floats) -> None:
         """Refuse times (n,) at which an input in the law is not known."""
-        used = self.exponents[self.support.any(axis=1), self.d :].sum(axis=0)
-        for function, times in zip(self.functions, used.tolist(), strict=False):
-            if function.of_time and times:
-                unknown = ~np.isfinite(function.value(np.repeat(t[:, None], self.d, axis=1)))
-                if unknown.any():
-                    raise ValueError(
-                        f"t: must lie where {function.name} is known, got {t[unknown][0]:g}"
-                    )
+        for function in self.inputs():
+            unknown = ~np.isfinite(function.at(t, self.d))
+            if unknown.any():
+                raise ValueError(
+                    f"t: must lie where {function.name} is known, got {t[unknown][0]:g}"
+                )
 
     def sides(self) -> dict[int, str]:
         """What stands left in text, by number of equation: ``dx/dt``, or ``x''`` of order 2."""

@@ -221,13 +221,11 @@ class Problem:
     @cached_property
     def jumps(self) -> list[Floats]:
         """Times at which an input of the law jumps, of each trajectory: there its slope does."""
-        at = np.eye(self.d)[-1]  # the time is the last state
-        inputs = [lambda t, f=f: f.value(t[:, None] * at) for f in self.functions if f.of_time]
         found = []
         for t, _ in self.trajectories:
             beside = 1e-11 * (t[-1] - t[0]) * np.array([-1, 1])  # also one that it begins with
             times = np.concatenate([t[:1] + beside[0], t, t[-1:] + beside[1]])
-            every = [jumps(one, times) for one in inputs]
+            every = [jumps(partial(f.at, d=self.d), times) for f in self.functions if f.of_time]
             found.append(np.unique(np.concatenate([np.zeros(0), *every])))
         return found
 
@@ -349,7 +347,7 @@ def unpruned(problem: Problem, rows: Bools) -> Fit:
     coefficients[~active] = 0.0
     still, shared = np.zeros(problem.d, dtype=bool), problem.form.shared
     state = State(control, coefficients, active, np.zeros(problem.d), still, shared)
-    for weight in (1e-1, 1e0, 1e1, 1e2):
+    for weight in (1.0, 1e2):
         fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
         if fit.status is not Status.CONVERGED:
             break

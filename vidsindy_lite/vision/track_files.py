@@ -8,7 +8,8 @@ this package       ``frame`` or ``t``, ``u``, ``v`` (``x``, ``y`` mean the same)
 DLTdv              ``pt1_cam1_X``, ``pt1_cam1_Y``, ...; the first pixel is 1, at the upper left
 Argus              ``Track 1_cam_1_x``, ...; the first pixel is 1, at the lower left
 DeepLabCut         rows ``scorer``, ``individuals`` (if there are several), ``bodyparts``,
-                   ``coords``; frames of a likelihood below .6 do not count
+                   ``coords``; frames of a likelihood below .6 do not count; of images that
+                   somebody labelled, the numbers in their names
 SLEAP              its analysis as CSV: ``track``, ``frame_idx``, ``nose.x``, ``nose.y``, ...
 TrackMate          its spots as CSV: ``TRACK_ID``, ``POSITION_X``, ..., ``FRAME``, or its tracks as
                    XML; in pixels
@@ -16,7 +17,8 @@ Kinovea            its trajectories as text, with ``#Kinovea`` in front
 Tracker (OSP)      the name of the mass over ``t``, ``x``, ``y``; better ``pixelx``, ``pixely``,
                    which count from the upper left corner of the image
 detectors          boxes, as ``x``, ``y``, ``w``, ``h`` (``left``, ``top``, ...), or two corners,
-                   ``x1``, ``y1``, ``x2``, ``y2`` (``xmin``, ...): their middles
+                   ``x1``, ``y1``, ``x2``, ``y2`` (``xmin``, ...): their middles, or a point of its
+                   own that lies in them
 =================  ===============================================================================
 
 Separators may be commas, semicolons, tabs or spaces, and decimals commas where these separate
@@ -32,8 +34,8 @@ import csv
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import product
+from dataclasses import dataclass, replace
+from itertools import chain, product
 
 import numpy as np
 
@@ -57,24 +59,33 @@ _TIME = re.compile(
 )
 _FRAME = (
     "frame", "frames", "step", "n", "frame_idx", "frame_id", "frame_number", "frame_no", "frameid",
+    "frame_index", "framenumber", "frame_num", "frame_n", "fnum", "slice", "slice_n", "image",
+    "index", "",
 )  # fmt: skip
 _PIXELS = (
     ("u", "v"), ("pixelx", "pixely"), ("x", "y"), ("x_px", "y_px"), ("position_x", "position_y"),
 )  # fmt: skip
-_WHOSE = ("track", "track_id", "particle", "id", "object_id", "tid", "individual")
+_WHOSE = (
+    "track", "track_id", "track_n", "particle", "id", "object", "object_id", "tid", "individual",
+)  # fmt: skip
 # Corner and size of a box, as the names of their columns.
-_SIZED = tuple(product(
-    (("x", "y"), ("left", "top"), ("bb_left", "bb_top"), ("u", "v"), ("bbox_x", "bbox_y")),
-    (("w", "h"), ("width", "height"), ("bb_width", "bb_height"), ("bbox_w", "bbox_h")),
-))  # fmt: skip
+_SIZED = (
+    *product((("left", "top"), ("x", "y")), (("w", "h"), ("width", "height"))),
+    (("bb_left", "bb_top"), ("bb_width", "bb_height")),
+    (("bbox_x", "bbox_y"), ("bbox_w", "bbox_h")),
+    (("bbox_left", "bbox_top"), ("bbox_width", "bbox_height")),
+)
 _OPPOSITE = (
     (("x1", "y1"), ("x2", "y2")), (("xmin", "ymin"), ("xmax", "ymax")),
     (("left", "top"), ("right", "bottom")),
 )  # fmt: skip
+_ANSWERS = {"true": "1", "yes": "1", "false": "0", "no": "0"}
 _UNSEEN = {"", "na", "n/a", "#n/a", "null", "none", "-", "--", "missing", "lost", "?"}
 _SEEN = (
     "visible", "visibility", "seen", "detected", "found", "valid", "score", "conf", "confidence",
 )  # fmt: skip
+_HIDDEN = ("occluded", "lost", "missing", "outside", "invisible")
+_READ = {"frame", "likelihood", *_SEEN, *_HIDDEN, *chain(*_PIXELS, *chain(*_SIZED, *_OPPOSITE))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,9 +154,7 @@ def read_tracks(path: str | os.PathLike, individual: str | None = None) -> list[
         elif text.lstrip().lower().startswith("#kinovea"):
             header, rows = _of_kinovea(text)
         else:
-            cells = _cells(text)
-            start = next((i for i, row in enumerate(cells) if _is_of_numbers(row)), len(cells))
-            header, rows = cells[:start], cells[start:]
+            header, rows = _of_table(text)
         if not rows:
             raise ValueError("must hold rows of numbers, got none")
         return _tracks(path.name, header, rows, individual)
@@ -157,6 +166,7 @@ def _tracks(
     """The tracks in the cells of a file."""
     heads = [[_plain(cell) for cell in row] for row in header] or [[]]
     names = heads[-1]
+    doubts: tuple[str, ...] = ()
     units = next((row for row in header if any(cell.strip().startswith("(") for cell in row)), None)
     if heads[0][:1] == ["scorer"]:
         names = _of_poses(header, names)
@@ -167,38 +177,46 @@ def _tracks(
             raise ValueError(
                 f"must have positions in pixels, got {unit}: remove the scale in TrackMate"
             )
+        if not units:
+            doubts = (f"{name}: its positions are taken for pixels: it does not say what they are",)
     width = len(names) or max(map(len, rows))
     rows = [[*row, *[""] * (width - len(row))] for row in rows]
-    who = next((names.index(key) for key in _WHOSE if key in names), None)
+    who, chosen = _column(names, _WHOSE), ""
     words = {row[who].strip() for row in rows} - {""} if who is not None else set()
     if who is not None and 0 < len(words) < max(len(rows), 2):  # else they count the rows
         whose = sorted(words, key=lambda word: (len(word), word))
         chosen = _chosen(whose, individual, lenient=True)
         rows = [row for row in rows if row[who].strip() == chosen]
+    frame = _column(names, _FRAME)
+    if frame is not None and (names[frame] or frame == 0):
+        names = [*names[:frame], "frame", *names[frame + 1 :]]
     values = _numbers(rows, width, names)
     if not header:
         if not 2 <= width <= 3:
             raise ValueError("must have a header, or columns u and v")
         names = ["frame" if _counts(values[:, 0]) else "t", "u", "v"][-width:]
-    frame = next((names.index(key) for key in _FRAME if key in names), None)
-    if who is not None and frame is not None:
-        values = values[np.argsort(values[:, frame], kind="stable")]
+    if who is not None and "frame" in names:
+        values = values[np.argsort(values[:, names.index("frame")], kind="stable")]
     twice = {key for key in names if key and names.count(key) > 1}
     if twice & {key for pair in _PIXELS for key in pair}:
         raise _several([f"{key} {names.count(key)} times" for key in sorted(twice)])
     columns = {key: values[:, names.index(key)] for key in names if key}
-    if heads[0][:1] == ["scorer"] and not np.isfinite(columns["frame"]).all():
-        del columns["frame"]  # these are names of images
     told = [m for known in _SERIES for key in columns if (m := known.fullmatch(key))]
-    if (
-        individual is not None
-        and who is None
-        and not any(m.groupdict().get("target") for m in told)
-    ):
-        raise ValueError(f"must name its targets, of which individual is one, got {individual!r}")
+    if "frame" not in columns and not any(map(_TIME.fullmatch, columns)):
+        steps = {key: np.diff(x) for key, x in columns.items() if len(x) > 2 and not _is_read(key)}
+        rising = [key for key, by in steps.items() if (by > 0).all() and (by != 1).any()]
+        if rising:
+            doubts += (
+                f"{name}: its rows are taken for frames one after the other, and {rising[0]!r}, "
+                "which rises from each to the next, is left out: if that is the number of the "
+                "frame or a time, call it frame or t",
+            )
     if any(match["axis"] in "uvxy" for match in told):
-        return _of_series(name, columns, told, individual, lenient=who is not None)
-    return [_track(name, columns, of_world=units is None and _is_of_tracker(header))]
+        found = _of_series(name, columns, told, individual, chosen)
+    else:
+        _check_meant(individual, chosen)
+        found = [_track(name, columns, of_world=units is None and _is_of_tracker(header))]
+    return [replace(track, warnings=(*track.warnings, *doubts)) for track in found]
 
 
 # ------------------------------------------------------------------------------- text into numbers
@@ -214,6 +232,25 @@ def _cells(text: str) -> list[list[str]]:
     if separator != ",":  # decimals may have commas then
         cells = [[cell.replace(",", ".") for cell in row] for row in cells]
     return cells
+
+
+def _of_table(text: str) -> tuple[list[list[str]], list[list[str]]]:
+    """The lines above the numbers, and those of numbers, without comments."""
+    cells = _cells(text)
+    poses = bool(cells) and cells[0][0].strip().lower() == "scorer"
+    begins = [row[0].strip().lower() == "coords" if poses else _is_of_numbers(row) for row in cells]
+    start = begins.index(True) + poses if True in begins else 1 if poses else len(cells)
+    header, rows = cells[:start], cells[start:]
+    if poses:  # names of folders may stand before those of images
+        more = next((i for i, cell in enumerate(header[0][1:]) if cell.strip()), 0)
+        return [[row[0], *row[1 + more :]] for row in header], [row[more:] for row in rows]
+    said = [row for row in header if row[0].startswith("#")]
+    header = [row for row in header if row not in said]
+    if said and rows and not header:  # the last comment may be the names of the columns
+        names = [cell.lstrip("# ") for cell in said[-1]]
+        names = names if names[0] else names[1:]
+        header = [names] if len(names) == len(rows[0]) else []
+    return header, rows
 
 
 def _of_xml(text: str) -> tuple[list[list[str]], list[list[str]]]:
@@ -253,28 +290,46 @@ def _plain(cell: str) -> str:
 
 def _is_of_numbers(row: Sequence[str]) -> bool:
     """Whether a line holds values: numbers or nothing, but for a name in front."""
-    if row and row[0].strip().lower() in ("scorer", "individuals", "bodyparts", "coords"):
-        return False  # of DeepLabCut, whatever stands in these
-    rest = row[1:] if len(row) > 1 and _number(row[0]) is None else row
-    numbers = [_number(cell) for cell in rest if cell.strip()]
-    return None not in numbers and (bool(numbers) or rest is row)
+    filled = [_number(cell) for cell in row if cell.strip()]
+    numbers = [number for number in filled if number is not None]
+    real = bool(np.isfinite(numbers).any())
+    return 2 * len(numbers) >= len(filled) if real else numbers == filled
 
 
 def _number(cell: str) -> float | None:
+    word = cell.strip().lower()
     try:
-        return float(cell) if cell.strip().lower() not in _UNSEEN else np.nan
+        return np.nan if word in _UNSEEN else float(_ANSWERS.get(word, word))
     except ValueError:
         return None
 
 
+def _is_read(name: str) -> bool:
+    """Whether something is made of a column."""
+    known = any(one.fullmatch(name) for one in (_TIME, *_SERIES))
+    return known or name in _READ
+
+
+def _column(names: Sequence[str], keys: Sequence[str]) -> int | None:
+    """The column of the first of some names that there is, whatever is between its words."""
+    plain = [re.sub(r"[\W_]+", "_", name).strip("_") for name in names]
+    return next((plain.index(key) for key in keys if key in plain), None)
+
+
 def _numbers(rows: list[list[str]], width: int, names: Sequence[str] = ()) -> Floats:
-    """All values, NaN where a cell is empty or missing, or names the target or the image."""
-    free = {0, *(i for i, name in enumerate(names) if name in (*_WHOSE, "label"))}
+    """All values, NaN where a cell is empty or missing, or words in a column that is not read.
+
+    Frames may be called by the names of their images: then the number in these counts.
+    """
+    images = names.index("frame") if "frame" in names else None
     values = np.full((len(rows), width), np.nan)
     for i, row in enumerate(rows):
         for j, cell in enumerate(row[:width]):
             number = _number(cell)
-            if number is None and j not in free:
+            if number is None and j == images:
+                digits = re.search(r"(\d+)\D*$", cell.rpartition(".")[0] or cell)
+                number = float(digits[1]) if digits else np.nan
+            if number is None and j and (not names or _is_read(names[j])):
                 raise ValueError(
                     f"must hold numbers below its header, got {cell!r:.40} in row {i + 1} of them"
                 )
@@ -300,6 +355,13 @@ def _chosen(names: Sequence[str], individual: str | None, *, lenient: bool) -> s
     return wanted[0]
 
 
+def _check_meant(individual: str | None, *chosen: str) -> None:
+    """Refuse what is chosen if a word of the individual is none of its names."""
+    said, found = individual or "", " ".join(chosen)
+    if said not in chosen and not set(said.split()) <= set(found.split()):
+        raise ValueError(f"must name the individual {said!r}, got {found.strip() or 'no names'}")
+
+
 def _several(names: Sequence[str]) -> ValueError:
     return ValueError(
         f"must hold one target, got {', '.join(names):.80}: leave one in it, or choose one by "
@@ -317,8 +379,8 @@ def _of_poses(header: list[list[str]], coords: list[str]) -> list[str]:
 
 
 def _of_series(
-    name: str, columns: Mapping[str, Floats], told: list[re.Match], individual: str | None, *,
-    lenient: bool,
+    name: str, columns: Mapping[str, Floats], told: list[re.Match], individual: str | None,
+    whose: str,
 ) -> list[TrackFile]:  # fmt: skip
     """The tracks of one target, by columns whose names say of what target or camera they are."""
     found: dict[tuple[str, int], dict[str, str]] = {}
@@ -331,8 +393,9 @@ def _of_series(
     seen = {
         of for of, axes in found.items() if np.isfinite([columns[k] for k in axes.values()]).any()
     }
-    target = _chosen(sorted({one for one, _ in seen or found}), individual, lenient=lenient)
-    shared = {key: x for key, x in columns.items() if key in _FRAME or _TIME.fullmatch(key)}
+    target = _chosen(sorted({one for one, _ in seen or found}), individual, lenient=bool(whose))
+    _check_meant(individual, whose, target)
+    shared = {key: x for key, x in columns.items() if key == "frame" or _TIME.fullmatch(key)}
     # Of DLTdv and Argus the first pixel is 1; of Argus rows count up from the lowest one.
     below = told[0].groupdict().get("below")
     tracks = []
@@ -361,6 +424,10 @@ def _track(
     if box:
         low, high = (np.array([columns[key] for key in keys]) for keys in box)
         sides = high if box in _SIZED else high - low
+    if box and pair:  # a point of its own, if it is inside
+        off = np.abs(low + sides / 2 - [columns[key] for key in pair])
+        box = box if pair == box[0] or (off > 0.45 * sides).any() else None
+    if box:
         # Edges of the first pixel are at -0.5 and 0.5; a box without an area is none.
         pixels = np.where((sides > 0).all(axis=0), low + sides / 2 - 0.5, np.nan).T
         doubts += (f"{name}: the middles of its boxes are taken, of {', '.join(box[0] + box[1])}",)
@@ -391,7 +458,7 @@ def _track(
     # Tracker, which writes times as well, counts from the corner of the first pixel.
     if pair == ("pixelx", "pixely") or (of_world and "t" in columns):
         pixels -= 0.5
-    frames = next((columns[key] for key in _FRAME if key in columns), None)
+    frames = columns.get("frame")
     clock = next((match for key in columns if (match := _TIME.fullmatch(key))), None)
     t, start = None, 0
     if clock is not None:
@@ -452,10 +519,10 @@ def _counts(frames: Floats) -> bool:
 
 
 def _is_of_tracker(header: list[list[str]]) -> bool:
-    """Whether the name of a mass, or of a program, stands above the columns."""
+    """Whether the name of a mass stands above the columns."""
     if len(header) < 2:
         return False
-    masses = [cell.strip() for cell in header[-2] if cell.strip() and cell[0] != "#"]
+    masses = [cell.strip() for cell in header[-2] if cell.strip()]
     if len(masses) > 1:
         raise _several(masses)
     return True

@@ -251,10 +251,16 @@ class OnnxDetector:
         padded = cv2.copyMakeBorder(resized, *margins, cv2.BORDER_CONSTANT, value=(114,) * 3)
         self.network.setInput(cv2.dnn.blobFromImage(padded, 1 / 255))
         found = np.asarray(self.network.forward(), np.float32)
-        if found.ndim != 3 or len(found) != 1 or found.shape[1] < 5:
+        if found.ndim != 3 or len(found) != 1 or not 5 <= found.shape[1] <= found.shape[2]:
             raise ValueError(
                 "detector: must give one array of shape (1, 4 + classes, anchors), "
                 f"got {found.shape} from '{self.path}'"
+            )
+        # Also of this shape are keypoints, masks and angles: mostly beyond.
+        if not ((found[0, 4:] >= -1e-3) & (found[0, 4:] <= 1 + 1e-3)).all():
+            raise ValueError(
+                "detector: must give scores from 0 to 1 below its boxes, "
+                f"got {found[0, 4:].min():g} to {found[0, 4:].max():g} from '{self.path}'"
             )
         found = np.concatenate([found[0, :4], found[0, 4:].max(axis=0, keepdims=True)])
         found[:2] -= np.array([[left], [top]])
