@@ -445,9 +445,10 @@ def untold_origins(found: Sequence[Rival], remedy: str) -> Iterator[str]:
     for where in dict.fromkeys(where for where, _, _ in found):
         axes = dict.fromkeys(name for other, name, _ in found if other == where)
         least = min(cost for other, _, cost in found if other == where)
+        well = "almost as well" if least > -STRONG else "better, which the search has missed"
         yield (
             f"the data hardly tell where the law's origin is in {' and in '.join(axes)}: other "
-            f"terms around {where} fit almost as well (criterion {least:+.1f}); use {remedy}"
+            f"terms around {where} fit {well} (criterion {least:+.1f}); use {remedy}"
         )
 
 
@@ -765,18 +766,19 @@ def _sampling(problem: Problem, fit: Fit, law: PolynomialSystem, remedy: str) ->
     form, turns = problem.form, problem.turns
     # Along the law: between samples that are few it may turn more often than a smoothing tells.
     x, slopes = fit.collocation.node_states(fit.state.control_points)
-    speed = np.sqrt((slopes**2).mean() / x.var(axis=0).mean())
     step = typical_step(problem.trajectories)
-    samples = 2 * np.pi / step / speed
     # On a line nothing turns; a body need not, if it is seen from several starts.
     bound = form.states > 1 and (form.movable.all() or len(problem.trajectories) == 1)
-    if turns < 1.5 and bound:
+    if turns < 0.1:  # of curves that are all but flat
+        yield "no curve through the samples tells a motion from noise: sample faster, if it is one"
+    elif turns < 1.5 and bound:
         yield (
             f"the trajectory covers only {turns:.1f} turns of the motion: terms may be "
             "indistinguishable on it; record longer, or several runs from other starts"
         )
-    if samples < 2 * np.pi:  # a step is longer than a time scale of the motion
-        yield f"only {samples:.1f} samples per turn of the motion: sample faster"
+    moved, size = step * np.sqrt((slopes**2).mean()), np.sqrt(x.var(axis=0).mean())
+    if moved > size > 0:  # a step is longer than a time scale of the motion
+        yield f"only {2 * np.pi * size / moved:.1f} samples per turn of the motion: sample faster"
     rates = np.linalg.eigvals(np.nan_to_num(problem.law(fit.state).gradient(x - fit.state.offset)))
     grows = min(float(np.median(rates.real.max(axis=1))) * step, 99.0)
     if grows > 1:

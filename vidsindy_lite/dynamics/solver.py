@@ -14,6 +14,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import permutations
 from threading import Lock
 
 import numpy as np
@@ -382,6 +383,9 @@ def accelerated(curves: Sequence[BSpline]) -> bool:
         for order in range(3)
     )
     linear = np.hstack([np.ones((len(x), 1)), x, v])
+    pairs = permutations(range(x.shape[1]), 2)
+    if any(unexplained(linear[:, [0, 1 + j]], v[:, [i]]) < 0.02 for i, j in pairs):
+        return False  # a coordinate is the velocity of another: the law has both
     # Cubic terms of more than three coordinates are so many that they may do no more than
     # interpolate, which leaves nothing: of these as many as a tenth of the points.
     whole = [monomial_exponents(x.shape[1], degree) for degree in (1, 2, 3)]
