@@ -7,6 +7,7 @@ one before it, the simplest is taken that the data bear: forces that are the sam
 """
 
 import os
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -94,6 +95,10 @@ class PlaneDiscovery(VideoDiscovery):
     def g(self) -> Quantity | None:
         """As of any motion; None of what leans, since a slope or a table bears it."""
         return None if self.leaning else super().g
+
+    def __str__(self) -> str:
+        said = super().__str__()
+        return re.sub(r"\bg = ", "pull = ", said) if self.leaning else said
 
 
 def discover_from_video(

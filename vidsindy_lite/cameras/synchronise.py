@@ -511,6 +511,10 @@ def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | No
                     ) + (f"; as well do {alike}: another path" if alike else "")
                     found.append(Mistake(text, mended, known, told))
                     break
+        if found:  # unless other lags explain it, of a motion that repeats itself, say
+            told = learn_lags(given.tracks, rig, given.rates, start, given.clocks)
+            if told.agree and told.residual <= 2 * DISAGREEMENT:
+                return None
     return min(found, key=lambda one: one.lags.residual, default=None)
 
 

@@ -370,7 +370,8 @@ class _Body:
                 if alone:
                     said[f"spring constant{label}"] = -pull[j, j]
                 if alone or swings[j]:
-                    said[f"damping{label}"] = -2 * rate.real
+                    lost = np.abs(rate.real) > 1e-12 * np.abs(rate)  # and not by rounding
+                    said[f"damping{label}"] = -2 * rate.real * lost
                 if swings[j]:
                     said[f"natural frequency{label}"] = np.abs(rate)
                     said[f"period{label}"] = 2 * np.pi / rate.imag

@@ -327,7 +327,7 @@ def spread_to_unseen(noise: Floats, seen: Bools) -> Floats:
 # Penalty continuation: fits while the physics weight rises.
 
 #: Physics weights of a search, relative to the misfit of a plain regression.
-WEIGHTS = (1e2, 1e4, 1e8)
+WEIGHTS = (1e5, 1e8)
 FINAL_WEIGHT = WEIGHTS[-1]  #: Weight at which the law holds exactly for all that the data can tell.
 
 
