@@ -123,6 +123,8 @@ def read_tree(name: str, path: Path, suffix: str) -> Any:
             raise RecursionError
         if suffix == ".toml":
             return tomllib.loads(text)
+        if suffix in (".yaml", ".yml") and not text.lstrip().startswith("%YAML"):
+            raise ValueError("which begins with %YAML:1.0, as OpenCV writes it")
         storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         try:
             return _plain(storage.root())
@@ -153,6 +155,9 @@ def _plain(node: Any) -> Any:
     """A node of OpenCV's files as mappings, lists and numbers."""
     if node.isMap():
         keys = node.keys()
+        if {"sizes", "data"} <= set(keys):  # of another number of axes than two
+            sizes = np.array(_plain(node.getNode("sizes")), dtype=int)
+            return np.array(_plain(node.getNode("data")), dtype=float).reshape(sizes)
         if {"rows", "cols", "data"} <= set(keys):
             if "dt" in keys:
                 return node.mat()

@@ -114,8 +114,8 @@ LEAST = ("knots_per_sample", "collocation_per_knot", "pretraining", "epochs", "l
         (spiral(80)[1][:5], {}, "x: must hold at least 6 samples, got 5"),
         (spiral(80)[1] * [1, 0], {}, "x: every coordinate must move"),
         (spiral(80)[1], {"seed": -1}, "seed: must be an integer of at least 0, got -1"),
-        *[(spiral(80)[1], {name: 0}, f"{name}: must be at least .*, got 0") for name in LEAST],
-        *[(spiral(80)[1], {"prune": v}, f"prune: must be at least 0, got {v}")
+        *[(spiral(80)[1], {name: 0}, f"{name}: must be .*at least .*, got 0") for name in LEAST],
+        *[(spiral(80)[1], {"prune": v}, f"prune: must be .*, got {v}")
           for v in (-1, np.nan, np.inf)],
     ],
 )  # fmt: skip

@@ -612,7 +612,10 @@ def _content(path: Path) -> Any:
         comma = "." if re.search(r";[ \t]*[-+\d]", text) else " "  # as spreadsheets write decimals
         lines = text.replace(",", comma).replace(";", " ").splitlines()
         with reading("paths", path, "rows of as many numbers each"):
-            return np.array([line.split() for line in lines if line.strip()], dtype=float)
+            rows = [line.split() for line in lines if line.strip()]
+            if len(lengths := {len(row) for row in rows}) > 1:
+                raise ValueError(f"{min(lengths)} numbers in one, and {max(lengths)} in another")
+            return np.array(rows, dtype=float)
     raise ValueError(
         "paths: must end in .toml, .yaml, .yml, .xml, .json, .npz, .npy, .csv or .txt, got "
         f"'{path}'"
@@ -653,6 +656,9 @@ def _tables(content: Any, name: str, warnings: list[str]) -> Iterator[tuple[str,
     if not isinstance(content, Mapping):
         return
     lower = {str(key).lower(): value for key, value in content.items()}
+    for part in ("intrinsics", "extrinsics"):
+        if isinstance(lower.get(part), Mapping):
+            lower |= {str(key).lower(): value for key, value in lower.pop(part).items()}
     known = {
         ours: lower[other] for ours, others in _NAMES.items() for other in others if other in lower
     }

@@ -511,11 +511,14 @@ def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | No
                     ) + (f"; as well do {alike}: another path" if alike else "")
                     found.append(Mistake(text, mended, known, told))
                     break
-        if found:  # unless other lags explain it, of a motion that repeats itself, say
-            told = learn_lags(given.tracks, rig, given.rates, start, given.clocks)
-            if told.agree and told.residual <= 2 * DISAGREEMENT:
-                return None
-    return min(found, key=lambda one: one.lags.residual, default=None)
+    best = min(found, key=lambda one: one.lags.residual, default=None)
+    if best:  # unless smaller lags explain it as well, of a motion that repeats itself, say
+        told = learn_lags(given.tracks, rig, given.rates, start, given.clocks)
+        late, sooner = (np.abs(lags.frames - start).sum() for lags in (told, best.lags))
+        alike = told.residual <= ALIKE * max(best.lags.residual, FINE)
+        if told.agree and alike and late + 1 < sooner:
+            return None
+    return best
 
 
 def _worst(fit: Adjustment) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from ..checks import check_array, shown
+from ..checks import check_array, check_vector, shown
 from ..dynamics import Discovery, PolynomialSystem, runge_kutta_4
 
 
@@ -70,8 +70,8 @@ def score(found: PolynomialSystem | Discovery, truth: PolynomialSystem) -> Score
     found : PolynomialSystem or Discovery
         The discovered law; anything else that has one as its ``system`` will do as well.
     truth : PolynomialSystem
-        The true law. Libraries may differ in size and order: terms are matched by monomial,
-        variables by position.
+        The true law. Libraries may differ in degree and order, not in their functions: terms are
+        matched by monomial, variables by position.
 
     Raises
     ------
@@ -93,9 +93,12 @@ def score(found: PolynomialSystem | Discovery, truth: PolynomialSystem) -> Score
             )
     if law.d != truth.d:
         raise ValueError(f"found: must have the dimension of truth, {truth.d}, got {law.d}")
-    if [f.name for f in law.functions] != [f.name for f in truth.functions] or (
-        law.exponents.shape[1] != truth.exponents.shape[1]
-    ):
+    points = np.random.default_rng(0).normal(size=(9, law.d))
+    functions = [
+        {f.name: np.nan_to_num(f.value(points)).round(9).tolist() for f in one.functions}
+        for one in (law, truth)
+    ]
+    if functions[0] != functions[1] or law.exponents.shape[1] != truth.exponents.shape[1]:
         raise ValueError("found: must have a library with the functions of truth, got others")
     if not truth.support.any():
         raise ValueError("truth: must have at least one term, got none")
@@ -239,7 +242,7 @@ def cramer_rao_bound(
     x0 : array_like, shape (d,)
         True initial condition.
     sigma : array_like, shape (d,)
-        Standard deviation of the Gaussian noise of each coordinate.
+        Standard deviation of the Gaussian noise of each coordinate, large where none is measured.
     moving : array_like of bool, shape (d,), optional
         Axes along which the origin is unknown; none by default.
 
@@ -247,9 +250,14 @@ def cramer_rao_bound(
     -------
     Bound
     """
-    d = system.d
+    d, sigma = system.d, check_vector("sigma", sigma, system.d)
+    if (sigma <= 0).any():
+        raise ValueError(f"sigma: must be positive, got {shown(sigma)}")
     moving = np.zeros(d, dtype=bool) if moving is None else np.asarray(moving, dtype=bool)
-    equations, terms = np.nonzero(system.support.T)
+    # That a velocity is the rate of its position is known, and that of the time.
+    unknown = np.arange(d) >= (system.states // 2 if system.order == 2 else 0)
+    unknown[system.states :] = False
+    equations, terms = np.nonzero((system.support & unknown).T)
     count, free = len(terms), d + len(terms) + int(moving.sum())
     x = system.simulate(t, x0)
     steps, responses = _sensitivities(system, t, x, equations, terms)

@@ -234,6 +234,13 @@ class OdeContest:
     methods: tuple[str, ...] = ("Gauss-Newton",)
     seed: int = 0
 
+    def __post_init__(self) -> None:
+        if self.number not in ODEBENCH or self.start not in (0, 1):
+            raise ValueError(
+                f"number: must be of ODEBench, 1 to {max(ODEBENCH)}, and start 0 or 1, "
+                f"got {self.number}, {self.start}"
+            )
+
     @property
     def condition(self) -> str:
         """The same for all that belong to one row of a table."""

@@ -32,7 +32,7 @@ from scipy.sparse.linalg import spsolve
 
 from .. import dynamics
 from ..arrays import Floats, Ints
-from ..checks import check_integer, check_times
+from ..checks import check_integer, check_number, check_times
 from ..dynamics import DEGREE, PolynomialSystem, monomials
 
 #: Weight of the second differences in the first curve: enough to carry it across gaps.
@@ -126,7 +126,9 @@ class SplineADOSettings:
         }  # fmt: skip
         for name, bound in least.items():
             value = getattr(self, name)
-            if not bound <= value < np.inf:
+            if isinstance(getattr(type(self), name), int):
+                check_integer(name, value, int(bound))
+            elif check_number(name, value) < bound:
                 raise ValueError(f"{name}: must be at least {bound}, got {value}")
 
 

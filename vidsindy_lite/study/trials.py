@@ -33,7 +33,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..cameras import Rig
-from ..checks import check_choice, check_integer
+from ..checks import check_choice, check_integer, check_number
 from ..dynamics import Discovery, PolynomialSystem, discover
 from ..pipeline import Observation, Refused, observe, observe_tracks
 from ..vision import LearnedDetector, Scene, detections, read_video, render_video
@@ -321,7 +321,9 @@ class Trial:
         check_choice("condition", self.condition, CONDITIONS)
         check_choice("method", self.method, METHODS)
         check_choice("source", self.source, SOURCES)
-        if not 0 <= self.level < np.inf or (self.level == 0) != (self.condition == "clean"):
+        if check_number("level", self.level) < 0 or (self.level == 0) != (
+            self.condition == "clean"
+        ):
             raise ValueError(
                 "level: must be 0 in the condition 'clean' and above 0 in all others, "
                 f"got {self.level} in {self.condition!r}"

@@ -189,7 +189,17 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
         doubts += hint.unlike(colour)
     found, bound = finished(views, film.motion, doubts)
     found = _filled(found, bound, film, ways, both.frame[rows], seed)
-    return replace(found, warnings=found.warnings + unsure(found))
+    found = replace(found, warnings=found.warnings + unsure(found))
+    if seed is not None and found.warnings and not _shown(seen, seed).any():
+        empty = f"in frame {seed.frame} nothing is seen to move in the box: is the target in it?"
+        found = replace(found, warnings=(empty, *found.warnings))
+    return found
+
+
+def _shown(seen: Candidates, seed: Spot) -> Bools:
+    """Which candidates have their centre in a box."""
+    inside = (np.abs(seen.centre - seed.centre) < seed.size / 2).all(axis=1)
+    return inside & (seen.frame == seed.frame)
 
 
 def unsure(found: Track) -> tuple[str, ...]:
@@ -220,13 +230,11 @@ def sighted(
 def _paths(seen: Candidates, hint: Hint | None, seed: Spot | None) -> list[Motion]:
     """The plainest paths, of what a hint allows."""
     if seed is not None:
-        frame, centre, size = seed
-        here = seen.frame == frame
-        near = (np.abs(seen.centre - centre) < size / 2).all(axis=1)
-        alike = np.abs(np.log(seen.area / (0.7 * size.prod()))) < 0.9
-        if not (here & near & alike).any():
+        here = seen.frame == seed.frame
+        alike = _shown(seen, seed) & (np.abs(np.log(seen.area / (0.7 * seed.size.prod()))) < 0.9)
+        if not alike.any():
             return []
-        quality = np.where(here, np.where(near & alike, seen.quality + TOLD, -TOLD), seen.quality)
+        quality = np.where(here, np.where(alike, seen.quality + TOLD, -TOLD), seen.quality)
         return [best_path(seen._replace(quality=quality))]
     liked = seen
     if hint is not None and hint.colour is not None:
@@ -245,8 +253,8 @@ def _plain(paths: Sequence[Motion], n: int) -> bool:
 
 def _tightened(seen: Candidates, seed: Spot) -> Spot:
     """A box that is drawn loosely around one plain thing, close around it."""
-    frame, centre, size = seed
-    here = (seen.frame == frame) & (np.abs(seen.centre - centre) < size / 4).all(axis=1)
+    size = seed.size
+    here = _shown(seen, seed._replace(size=size / 2))
     inside = np.flatnonzero(here & (seen.box[:, 2:] < size).all(axis=1) & (seen.quality > 0.8))
     if not len(inside):
         return seed
@@ -505,7 +513,9 @@ def _filled(
         stray = np.linalg.norm(pixels - there, axis=1) > 0.5 * size + 2
         pixels[stray], confidence[stray] = np.nan, 0
     at = np.flatnonzero(np.isfinite(pixels[:, 0]))
-    known = frames[np.isfinite(film.motion.errors[frames])]
+    edge = ways.box[frames, :2] + ways.box[frames, 2:]
+    whole = (ways.box[frames, :2] > -0.5).all(axis=1) & (edge < film.frames.info.size).all(axis=1)
+    known = frames[whole & np.isfinite(film.motion.errors[frames])]
     for i in np.setdiff1d(known, at).tolist():
         confidence[i] = _confidence(vague)
         beside = np.concatenate([at[at < i][-4:], at[at > i][:4]])
