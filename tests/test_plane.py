@@ -216,6 +216,7 @@ def test_what_a_slope_bears_has_no_g(monkeypatch):
     filmed(monkeypatch, pixels_of(noisy(rolled, 0)))
     found = vl.discover_from_video("slope.mp4", STICK)
     assert (found.status, found.g) == ("ok", None)
+    assert ("pull = " in str(found), " g = " in str(found)) == (True, False)
     assert "53 degrees off the vertical: something bears it" in found.rig.note
     filmed(monkeypatch, pixels_of(flight((0, 1))[1]).round())  # straight down, in whole pixels
     found = vl.discover_from_video("drop.mp4", STICK)

@@ -191,6 +191,15 @@ def test_a_mistake_is_named(cause, seed, of):
         assert find_mistake(Footage.of(tracks), rig, VIEWS) is None
 
 
+def test_a_motion_that_repeats_itself_is_no_mistake():
+    turn = 2 * np.pi * np.arange(300) / 41.3
+    x = np.column_stack([np.cos(turn), 0.9 * np.sin(turn), 0.5 * np.cos(turn + 1)])
+    rig, rng = vl.Rig.around(x), np.random.default_rng(1)
+    tracks = [camera.project(x) + 0.05 * rng.normal(size=(300, 2)) for camera in rig.cameras]
+    given = [tracks[0], tracks[1][12:], tracks[2]]
+    assert find_mistake(Footage.of(given), rig.uncalibrated(keep=0), VIEWS) is None
+
+
 def test_the_path_is_found_without_it_and_that_is_told_first():
     rig, tracks, _, _ = of_a_law(1)
     right = vl.observe_tracks(tracks, rig, np.arange(400.0))

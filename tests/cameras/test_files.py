@@ -81,7 +81,8 @@ def test_opencv_storage_one_file_a_camera(tmp_path, suffix):
         storage.write("image_width", SIZE[0])
         storage.write("image_height", SIZE[1])
         storage.write("camera_matrix", part["K"])
-        storage.write("distortion_coefficients", part["dist"].reshape(-1, 1))
+        # Arrays of one axis, too, as OpenCV 5 writes them.
+        storage.write("distortion_coefficients", part["dist"].ravel())
         storage.write("rvec", cv2.Rodrigues(part["R"])[0])
         storage.write("tvec", part["t"].reshape(-1, 1))
         storage.release()
@@ -109,6 +110,10 @@ def from_json(folder, content):
 def test_plain_json_and_arrays(tmp_path):
     parts = rooms(5)
     assert_same(from_json(tmp_path, {"cameras": listed(parts)}), parts)
+    inner = [{k: v for k, v in part.items() if k not in "Rt"} for part in listed(parts)]
+    split = [part | {"intrinsics": own} for part, own in zip(listed(parts), inner, strict=True)]
+    split = [{k: v for k, v in part.items() if k in ("R", "t", "intrinsics")} for part in split]
+    assert_same(from_json(tmp_path, split), parts)
     paths = [tmp_path / f"{i}.npz" for i in range(3)]
     for path, part in zip(paths, parts, strict=True):
         np.savez(path, mtx=part["K"], dist=part["dist"], R=part["R"], T=part["t"])
@@ -213,12 +218,12 @@ def test_malformed_tables_are_refused_by_name(tmp_path, old, new, message):
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("a.csv", "1,2,3\n4,5\n", "must be rows of as many numbers each, got"),
+        ("a.csv", "1,2,3\n4,5\n", "of as many numbers each, .*: 2 numbers in one, and 3 in"),
         ("a.csv", "1,2,3\n4,5,6\n", "must hold 11 DLT coefficients per camera"),
         ("a.csv", "nan,2\n" * 11, "must hold finite numbers"),
         ("a.csv", "0,0\n" * 11, "must be of a camera at a finite place"),
         ("a.json", "{", "must be a JSON file"),
-        ("a.yml", "no yaml: [", "a.yml"),
+        ("a.yml", "cam0: {intrinsics: [1, 2]}", "begins with %YAML:1.0, as OpenCV writes it"),
         ("a.npz", "PK\x03\x04 no archive", "must be a .npz file of numbers"),
         ("a.mat", "x", "must end in .toml, .* or .txt, got '.*a.mat'"),
         ("a.toml", "a = " + "9" * 400, "must hold numbers of less than 300 digits, got 999"),

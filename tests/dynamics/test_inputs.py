@@ -190,6 +190,26 @@ def test_nothing_is_made_of_the_time_in_which_an_input_jumped():
         vl.discover(t, x, library=Library.polynomial(1) + often)
 
 
+@pytest.mark.parametrize("own", [False, True])
+def test_under_an_input_that_jumps_a_long_motion_is_followed_to_its_end(own):
+    t = np.arange(1501) / 5
+    u = np.where(np.random.default_rng(0).random(301) < 0.5, -1.0, 1.0)[(t + 1e-9).astype(int)]
+    held = Input.of("u", t, u, "zero")
+    known = Library.terms({"u": lambda t: held(t)}) if own else Library.inputs(t, {"u": u}, "zero")
+    system = {"x": {"x": -0.5, "u": 10.0}, "t": {"1": 1.0}}
+    law = PolynomialSystem.from_terms(system, library=Library.polynomial(1) + known)
+    path, end = law.followed(t, [0.0])
+    x = [0.0]
+    for push in u[:-1]:
+        x.append(x[-1] * np.exp(-0.1) + 20 * push * (1 - np.exp(-0.1)))
+    assert end == ""
+    np.testing.assert_allclose(path[:, 0], x, atol=1e-8)
+    with pytest.raises(ValueError, match="x0: its time must be that of t, 1, got 7"):
+        law.followed(t[5:], [0.0, 7.0])
+    with pytest.raises(ValueError, match="t: must lie where u is known, got 3"):
+        law.followed([0.0, 600.0], [0.0])
+
+
 def test_runs_that_begin_where_an_input_jumps():
     ends = np.searchsorted(CLOCK, SWITCHED)
     runs = list(zip(np.split(CLOCK, ends), np.split(noisy(charged(), 0.02), ends), strict=True))
@@ -225,6 +245,7 @@ def test_an_input_is_a_spline_and_unknown_outside():
         ),
         (lambda: Library.inputs(T, {"u v": T}), "inputs: must be named like variables.* got 'u v'"),
         (lambda: Library.inputs([1.0], {"u": [1.0]}), "at least 2 samples, got 1"),
+        (lambda: Library.inputs(T + 1.7e9, {"u": T}), "told apart to a ten-millionth of their"),
         (lambda: Library.inputs([T, T], {"u": [T]}), "u: must be one per .*, got 1 for 2"),
         (lambda: Library.inputs([T, T], {"u": [T, T]}), "times apart .* to t = 40 and one from"),
         (

@@ -161,6 +161,9 @@ def test_a_long_motion_is_followed_to_its_end():
     path, end = integrate(circle, np.array([0.0, 600.0]), np.array([0.0, 1.0]), most_steps=200)
     np.testing.assert_allclose(path[-1], [np.sin(600.0), np.cos(600.0)], atol=1e-6)
     assert end == ""
+    law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1}})
+    soon, far = (law.simulate([begin, begin + 1], [1, 0]) for begin in (0, 1e15))
+    np.testing.assert_array_equal(far, soon)
 
 
 T, X = np.arange(5.0), np.ones((5, 2))

@@ -103,6 +103,24 @@ def test_without_a_force_a_coordinate_moves_evenly():
     assert found.system.text().splitlines()[:2] == ["x'' = 0", "y'' = 0"]
 
 
+def test_velocities_that_are_given_need_no_second_order():
+    t = np.linspace(0, 30, 1200)
+    swing = solve_ivp(
+        lambda t, x: [x[1], -x[0] - 0.2 * x[1] + 0.5 * np.cos(1.7 * t)], (0, 30), [1, 0], t_eval=t,
+        rtol=1e-9,
+    ).y.T  # fmt: skip
+    found = discover(t, noisy(swing, 0.01))
+    assert found.system.order == 1
+    assert "the motion may not be autonomous" in found.warnings[0]
+
+
+def test_too_few_samples_a_turn_are_told():
+    t = np.arange(1000) * 2 * np.pi / 2.6
+    swing = np.exp(-0.001 * t)[:, None] * np.column_stack([np.cos(t), -np.sin(t)])
+    said = " ".join(discover(t, noisy(swing, 0.01)).warnings)
+    assert ("sample faster" in said, "record longer" in said) == (True, False)
+
+
 def test_one_throw_is_called_undetermined():
     found = discover(throws(drag, THROWS[:1], 0.01), order=2, degree=2)
     assert found.status == "suspect"

@@ -62,6 +62,12 @@ def test_nothing_found():
     text = "3 terms missing, 0 false; relative l2 1, worst coefficient 1, precision 0%, recall 0%"
     assert str(result) == text
     assert score(SINE, SINE).terms_found
+    assert score(dragged(1), dragged(1)).exact
+
+
+def dragged(power):
+    known = Library.terms({"drag": lambda x: np.abs(x) ** power * x})
+    return PolynomialSystem.from_terms({"x": {"drag": -1}}, library=known)
 
 
 @pytest.mark.parametrize(
@@ -73,6 +79,7 @@ def test_nothing_found():
         (score, TRUTH, SimpleNamespace(system=TRUTH), "truth: must be a Poly.*found comes first"),
         (score, LINE, SINE, "found: must have a library with the functions"),
         (score, LINE, ENZYME, "found: must have a library with the functions"),
+        (score, dragged(1), dragged(3), "found: must have a library with the functions"),
         (trajectory_error, np.zeros((3, 2)), np.zeros((4, 2)), r"x: must have the shape of truth"),
         (trajectory_error, np.full((4, 2), np.nan), np.zeros((4, 2)), "x: must hold at least one"),
     ],
@@ -91,6 +98,11 @@ def test_an_unknown_origin_agrees_with_its_closed_form():
     errors = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
     assert bound.coefficients[1, 0] == pytest.approx(errors[0], rel=1e-5)
     assert bound.offset[0] == pytest.approx(errors[2], rel=1e-5)
+    moving = PolynomialSystem.from_terms({"x": {"vx": 1}, "vx": {"x": -1}})
+    known = cramer_rao_bound(moving, t, [1, 0], [0.1, 1e6]).coefficients  # that x' = vx
+    assert (known > 0).sum() == 1
+    with pytest.raises(ValueError, match="sigma: must be positive"):
+        cramer_rao_bound(moving, t, [1, 0], [0.1, 0])
 
 
 def test_a_nonlinear_law_in_the_plane_agrees_with_differences():

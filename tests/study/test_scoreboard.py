@@ -135,6 +135,7 @@ LORENZ = SYSTEMS["Lorenz"]
     [
         (lambda: FlowContest("Lorentz", "drift 0.2 %"), "flow: must be one of .* got 'Lorentz'"),
         (lambda: FlowContest("Lorenz", "noise"), "error: must be one of .* got 'noise'"),
+        (lambda: OdeContest(64), "number: must be of ODEBench, 1 to 63, and start 0 or 1, got 64"),
         (lambda: run_contest(LorenzContest(4, 0.1, methods=("guess",))), "methods: must be one of"),
         (lambda: Ablation(LorenzContest(4, 0.1), "luck"), "without: must be"),
         (lambda: replace(LORENZ, period=0), "period: must be positive"),

@@ -265,6 +265,7 @@ def test_a_small_target_is_followed_from_a_box_that_is_drawn_loosely(tmp_path):
     assert found.warnings == ()
     still, again = (track(path, target=Hint(frame=10, box=(230, 110, 20, 20))) for _ in range(2))
     assert "looks alone" in " ".join(still.warnings)
+    assert "in frame 10 nothing is seen to move in the box" in still.warnings[0]
     np.testing.assert_array_equal(again.pixels, still.pixels)  # to the last bit
 
 
