@@ -70,26 +70,6 @@ def test_gauss_newton_is_told_the_systematic_errors_of_what_cameras_reconstructe
     assert 0 < 10 * rms["sub-pixel"] < rms["detector"]
 
 
-@pytest.mark.parametrize("source", ["sub-pixel", "detector"])
-def test_tracks_are_corrupted_each_by_its_own_draw_before_the_cameras_are_learned(
-    source, this_film, monkeypatch
-):
-    given, observe = [], experiments.observe_tracks
-    monkeypatch.setattr(
-        experiments,
-        "observe_tracks",
-        lambda tracks, *rest, **o: given.extend(tracks) or observe(tracks, *rest, **o),
-    )
-    from_source(source, condition="noise", level=0.02)
-    seen = this_film.detected if source == "detector" else this_film.tracks
-    off = [track - true for track, true in zip(given, seen, strict=True)]
-    for wrong, true in zip(off, seen, strict=True):
-        np.testing.assert_allclose(wrong.std(axis=0), 0.02 * true.std(axis=0), rtol=0.2)
-    assert abs(np.corrcoef(off[0][:, 0], off[1][:, 0])[0, 1]) < 0.3
-    whole = all((track == np.round(track)).all() for track in given)
-    assert whole == (source == "detector")
-
-
 def test_where_cameras_cannot_be_learned_no_method_has_a_law(this_film, monkeypatch):
     def refuse(tracks, *_, **__):
         raise Refused("tracks: the motion must determine the cameras", "cameras", tracks)
