@@ -81,8 +81,8 @@ sindy = CONTESTANTS[-2:]  # SINDy with a smoothing spline, and with the truth to
 #   origin, no threshold. Gauss-Newton runs with its defaults.
 # * The baselines are those of [notebook 05](05_discovery.ipynb). Their thresholds are chosen without the truth, by
 #   the error of the derivatives on the last fifth of the record. Model-A is SINDy as a careful user has it: with the derivatives of
-#   a smoothing spline. The **oracle** is no contestant: of all thresholds, with differences and with splines, it takes the law
-#   whose path comes closest to the clean one.
+#   a smoothing spline. The **oracle** is no contestant: of many more thresholds, with differences and with splines, it takes the
+#   exact law, if there is one, or that whose path comes closest to the clean one.
 # * **Exact** means: every true term and no other.
 # * Only Gauss-Newton says whether it trusts its law. *Wrong and ok* is the worst that can happen, *right but doubted* the
 #   price of caution.

@@ -328,7 +328,7 @@ def spread_to_unseen(noise: Floats, seen: Bools) -> Floats:
 
 #: Physics weights of a search, relative to the misfit of a plain regression. At the last alone some
 #: fits creep; with one between no law more is found, of 96 flows with errors and 111 of ODEBench.
-WEIGHTS = (1e5, 1e8)
+WEIGHTS = (1e2, 1e8)
 FINAL_WEIGHT = WEIGHTS[-1]  #: Weight at which the law holds exactly for all that the data can tell.
 
 

@@ -442,7 +442,11 @@ def _chosen_by_the_truth(data: Data, seed: int) -> PolynomialSystem:
         raise ValueError(f"methods: {ORACLE!r} needs a contest that has a clean path")
     times, states = data.clean
     laws = candidates(data.t, data.x, data.degree, seed)
-    return max(laws, key=lambda law: _r2(law, times, states))
+
+    def merit(law: PolynomialSystem) -> tuple[bool, float]:
+        return data.truth is not None and score(law, data.truth).exact, _r2(law, times, states)
+
+    return max(laws, key=merit)
 
 
 def _r2(law: PolynomialSystem, t: Floats, clean: Floats) -> float:
