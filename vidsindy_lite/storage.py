@@ -123,9 +123,10 @@ def read_tree(name: str, path: Path, suffix: str) -> Any:
             raise RecursionError
         if suffix == ".toml":
             return tomllib.loads(text)
-        if suffix in (".yaml", ".yml") and not text.lstrip().startswith("%YAML"):
-            raise ValueError("which begins with %YAML:1.0, as OpenCV writes it")
-        storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
+        try:
+            storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
+        except (cv2.error, SystemError):
+            raise ValueError("OpenCV cannot read it, which reads what it writes") from None
         try:
             return _plain(storage.root())
         finally:
@@ -155,7 +156,7 @@ def _plain(node: Any) -> Any:
     """A node of OpenCV's files as mappings, lists and numbers."""
     if node.isMap():
         keys = node.keys()
-        if {"sizes", "data"} <= set(keys):  # of another number of axes than two
+        if {"sizes", "dt", "data"} <= set(keys):  # of another number of axes than two
             sizes = np.array(_plain(node.getNode("sizes")), dtype=int)
             return np.array(_plain(node.getNode("data")), dtype=float).reshape(sizes)
         if {"rows", "cols", "data"} <= set(keys):

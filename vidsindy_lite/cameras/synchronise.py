@@ -515,8 +515,8 @@ def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | No
     if best:  # unless smaller lags explain it as well, of a motion that repeats itself, say
         told = learn_lags(given.tracks, rig, given.rates, start, given.clocks)
         late, sooner = (np.abs(lags.frames - start).sum() for lags in (told, best.lags))
-        alike = told.residual <= ALIKE * max(best.lags.residual, FINE)
-        if told.agree and alike and late + 1 < sooner:
+        as_well = told.residual <= ALIKE * max(best.lags.residual, FINE)
+        if told.agree and as_well and late + 1 < sooner:
             return None
     return best
 

@@ -523,8 +523,8 @@ class PolynomialSystem:
             if abs(x0[-1] - t[0]) > 1e-6 * (since[-1] or 1.0):
                 raise ValueError(f"x0: its time must be that of t, {t[0]:g}, got {x0[-1]:g}")
             x0[-1], clock[-1] = 0.0, t[0]  # counted from the first, times are exact
-        # What is known at all of them may be unknown between two.
-        self.check_inputs(np.union1d(t, np.linspace(t[0], t[-1], 1000)))
+        for times in (t, np.linspace(t[0], t[-1], 1000)):  # it may be unknown between two
+            self.check_inputs(times)
         # A step ends just before an input jumps, and one just after.
         at = [jumps(partial(one.at, d=self.d), t) - t[0] for one in inputs]
         just = 2e-9 * np.diff(t).max(initial=0.0)

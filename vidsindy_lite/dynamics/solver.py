@@ -14,7 +14,6 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import permutations
 from threading import Lock
 
 import numpy as np
@@ -206,7 +205,8 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     problem, whole, linear = problems[0], task.library.degree, None
     given, timed = order == 1 or task.library.given, task.library.timed(task.names)
     drowned = problem.noise.max() > 0.5  # a curve shows no accelerations
-    body = order == "auto" and not (given or timed or drowned) and accelerated(problem.curves)
+    body = order == "auto" and not (given or timed or drowned or has_velocities(problem))
+    body = body and accelerated(problem.curves)
     if body and whole:
         linear = _of_forces(task, 1)  # no law of first order holds: its search would be in vain
         if linear and not linear.warnings and not _swing(task, problem, places=False):
@@ -376,22 +376,33 @@ def accelerated(curves: Sequence[BSpline]) -> bool:
     of 40 %, outside the library up to .002; throws .02. Of the accelerations' squares clean flows
     leave .26 to .64 to no linear law, springs and throws up to .06.
     """
-    # The outermost spans bend by chance.
-    times = [np.arange(curve.t[DEGREE + 1], curve.t[-DEGREE - 2], 1 / 10) for curve in curves]
-    x, v, a = (
-        np.concatenate([curve(t, order) for curve, t in zip(curves, times, strict=True)])
-        for order in range(3)
-    )
+    x, v, a = rates(curves)
     linear = np.hstack([np.ones((len(x), 1)), x, v])
-    pairs = permutations(range(x.shape[1]), 2)
-    if any(unexplained(linear[:, [0, 1 + j]], v[:, [i]]) < 0.02 for i, j in pairs):
-        return False  # a coordinate is the velocity of another: the law has both
     # Cubic terms of more than three coordinates are so many that they may do no more than
     # interpolate, which leaves nothing: of these as many as a tenth of the points.
     whole = [monomial_exponents(x.shape[1], degree) for degree in (1, 2, 3)]
     most = max(20, len(x) / 10, len(whole[0]))
     several = unexplained(monomials(x, [e for e in whole if len(e) <= most][-1]), v)
     return several > 0.5 or (several > 0.005 and unexplained(linear, a) < 0.15)
+
+
+def rates(curves: Sequence[BSpline]) -> list[Floats]:
+    """Places, slopes and second derivatives along curves, (n, d) each."""
+    # The outermost spans bend by chance.
+    times = [np.arange(curve.t[DEGREE + 1], curve.t[-DEGREE - 2], 1 / 10) for curve in curves]
+    return [
+        np.concatenate([curve(t, order) for curve, t in zip(curves, times, strict=True)])
+        for order in range(3)
+    ]
+
+
+def has_velocities(problem: Problem) -> bool:
+    """Whether the coordinates are places and their velocities, each with the other."""
+    x, v, _ = rates(problem.curves)
+    places, slopes = problem.units.point(x), v * problem.units.scale / problem.units.time
+    off = ((slopes[:, :, None] - places[:, None]) ** 2).mean(axis=0)
+    pairs = off < 0.05 * (slopes**2).mean(axis=0)[:, None]
+    return bool((pairs.any(axis=0) | pairs.any(axis=1)).all())
 
 
 def unexplained(terms: Floats, values: Floats) -> float:

@@ -95,7 +95,7 @@ def score(found: PolynomialSystem | Discovery, truth: PolynomialSystem) -> Score
         raise ValueError(f"found: must have the dimension of truth, {truth.d}, got {law.d}")
     points = np.random.default_rng(0).normal(size=(9, law.d))
     functions = [
-        {f.name: np.nan_to_num(f.value(points)).round(9).tolist() for f in one.functions}
+        [(f.name, np.nan_to_num(f.value(points)).round(9).tolist()) for f in one.functions]
         for one in (law, truth)
     ]
     if functions[0] != functions[1] or law.exponents.shape[1] != truth.exponents.shape[1]:

@@ -60,8 +60,8 @@ _TIME = re.compile(
 _FRAME = (
     "frame", "frames", "step", "n", "frame_idx", "frame_id", "frame_number", "frame_no", "frameid",
     "frame_index", "framenumber", "frame_num", "frame_n", "fnum", "slice", "slice_n", "image",
-    "index", "",
 )  # fmt: skip
+_ROW = ("index",)  # of a table: where it leaves some out, these are frames without a target
 _PIXELS = (
     ("u", "v"), ("pixelx", "pixely"), ("x", "y"), ("x_px", "y_px"), ("position_x", "position_y"),
 )  # fmt: skip
@@ -69,12 +69,12 @@ _WHOSE = (
     "track", "track_id", "track_n", "particle", "id", "object", "object_id", "tid", "individual",
 )  # fmt: skip
 # Corner and size of a box, as the names of their columns.
-_SIZED = (
-    *product((("left", "top"), ("x", "y")), (("w", "h"), ("width", "height"))),
-    (("bb_left", "bb_top"), ("bb_width", "bb_height")),
-    (("bbox_x", "bbox_y"), ("bbox_w", "bbox_h")),
-    (("bbox_left", "bbox_top"), ("bbox_width", "bbox_height")),
-)
+_SIZED = tuple(product(
+    (("left", "top"), ("bb_left", "bb_top"), ("bbox_left", "bbox_top"), ("bbox_x", "bbox_y"),
+     ("x", "y"), ("u", "v")),
+    (("w", "h"), ("width", "height"), ("bb_width", "bb_height"), ("bbox_w", "bbox_h"),
+     ("bbox_width", "bbox_height")),
+))  # fmt: skip
 _OPPOSITE = (
     (("x1", "y1"), ("x2", "y2")), (("xmin", "ymin"), ("xmax", "ymax")),
     (("left", "top"), ("right", "bottom")),
@@ -179,18 +179,29 @@ def _tracks(
             )
         if not units:
             doubts = (f"{name}: its positions are taken for pixels: it does not say what they are",)
+    names = [names[0] or "index", *names[1:]] if names else names
     width = len(names) or max(map(len, rows))
     rows = [[*row, *[""] * (width - len(row))] for row in rows]
     who, chosen = _column(names, _WHOSE), ""
-    words = {row[who].strip() for row in rows} - {""} if who is not None else set()
+    if who is not None:
+        for row in rows:
+            row[who] = re.sub(r"\.0+$", "", row[who].strip())  # a number is called so, too
+    words = {row[who] for row in rows} - {""} if who is not None else set()
     if who is not None and 0 < len(words) < max(len(rows), 2):  # else they count the rows
         whose = sorted(words, key=lambda word: (len(word), word))
         chosen = _chosen(whose, individual, lenient=True)
-        rows = [row for row in rows if row[who].strip() == chosen]
+        rows = [row for row in rows if row[who] == chosen]
     frame = _column(names, _FRAME)
-    if frame is not None and (names[frame] or frame == 0):
-        names = [*names[:frame], "frame", *names[frame + 1 :]]
-    values = _numbers(rows, width, names)
+    counted = frame is not None
+    if frame is None and who is None:
+        frame = _column(names[:1], _ROW)
+    values = _numbers(rows, width, names, frame)
+    if frame is not None:
+        # Images may be called by their times, and what is called image or n may be anything.
+        numbers, sure = values[:, frame], "frame" in names[frame]
+        if sure or (_counts(numbers) and np.diff(numbers).min(initial=np.inf) <= 10):
+            names = [*names[:frame], "frame", *names[frame + 1 :]]
+            values[:, frame] -= 0 if counted else numbers[0]
     if not header:
         if not 2 <= width <= 3:
             raise ValueError("must have a header, or columns u and v")
@@ -248,7 +259,7 @@ def _of_table(text: str) -> tuple[list[list[str]], list[list[str]]]:
     header = [row for row in header if row not in said]
     if said and rows and not header:  # the last comment may be the names of the columns
         names = [cell.lstrip("# ") for cell in said[-1]]
-        names = names if names[0] else names[1:]
+        names = names if len(names) == len(rows[0]) else names[1:]
         header = [names] if len(names) == len(rows[0]) else []
     return header, rows
 
@@ -312,22 +323,22 @@ def _is_read(name: str) -> bool:
 
 def _column(names: Sequence[str], keys: Sequence[str]) -> int | None:
     """The column of the first of some names that there is, whatever is between its words."""
-    plain = [re.sub(r"[\W_]+", "_", name).strip("_") for name in names]
-    return next((plain.index(key) for key in keys if key in plain), None)
+    plain = [re.sub(r"[\W_]+", "_", name).strip("_") or name for name in names]
+    ways = product((names, plain), keys)
+    return next((list(known).index(key) for known, key in ways if key in known), None)
 
 
-def _numbers(rows: list[list[str]], width: int, names: Sequence[str] = ()) -> Floats:
+def _numbers(rows: list[list[str]], width: int, names: Sequence[str], images: int | None) -> Floats:
     """All values, NaN where a cell is empty or missing, or words in a column that is not read.
 
-    Frames may be called by the names of their images: then the number in these counts.
+    Frames may be called by the names of their `images`: then the number in these counts.
     """
-    images = names.index("frame") if "frame" in names else None
     values = np.full((len(rows), width), np.nan)
     for i, row in enumerate(rows):
         for j, cell in enumerate(row[:width]):
             number = _number(cell)
             if number is None and j == images:
-                digits = re.search(r"(\d+)\D*$", cell.rpartition(".")[0] or cell)
+                digits = re.search(r"(?<![\d.])(\d+)\D*$", cell.rpartition(".")[0] or cell)
                 number = float(digits[1]) if digits else np.nan
             if number is None and j and (not names or _is_read(names[j])):
                 raise ValueError(
@@ -394,7 +405,8 @@ def _of_series(
         of for of, axes in found.items() if np.isfinite([columns[k] for k in axes.values()]).any()
     }
     target = _chosen(sorted({one for one, _ in seen or found}), individual, lenient=bool(whose))
-    _check_meant(individual, whose, target)
+    if whose:
+        _check_meant(individual, whose, target)
     shared = {key: x for key, x in columns.items() if key == "frame" or _TIME.fullmatch(key)}
     # Of DLTdv and Argus the first pixel is 1; of Argus rows count up from the lowest one.
     below = told[0].groupdict().get("below")
@@ -426,7 +438,8 @@ def _track(
         sides = high if box in _SIZED else high - low
     if box and pair:  # a point of its own, if it is inside
         off = np.abs(low + sides / 2 - [columns[key] for key in pair])
-        box = box if pair == box[0] or (off > 0.45 * sides).any() else None
+        inside = ((off <= 0.45 * sides) | ~(sides > 0)).all()
+        box = None if inside and pair != box[0] else box
     if box:
         # Edges of the first pixel are at -0.5 and 0.5; a box without an area is none.
         pixels = np.where((sides > 0).all(axis=0), low + sides / 2 - 0.5, np.nan).T
