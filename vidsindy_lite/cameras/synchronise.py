@@ -512,11 +512,11 @@ def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | No
                     found.append(Mistake(text, mended, known, told))
                     break
     best = min(found, key=lambda one: one.lags.residual, default=None)
-    if best:  # unless smaller lags explain it as well, of a motion that repeats itself, say
+    moved = 0.0 if best is None else np.abs(best.lags.frames - start).sum()
+    if best and moved > 1:  # smaller lags may explain it as well, of a motion that repeats itself
         told = learn_lags(given.tracks, rig, given.rates, start, given.clocks)
-        late, sooner = (np.abs(lags.frames - start).sum() for lags in (told, best.lags))
         as_well = told.residual <= ALIKE * max(best.lags.residual, FINE)
-        if told.agree and as_well and late + 1 < sooner:
+        if told.agree and as_well and np.abs(told.frames - start).sum() + 1 < moved:
             return None
     return best
 

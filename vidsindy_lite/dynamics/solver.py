@@ -205,8 +205,8 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     problem, whole, linear = problems[0], task.library.degree, None
     given, timed = order == 1 or task.library.given, task.library.timed(task.names)
     drowned = problem.noise.max() > 0.5  # a curve shows no accelerations
-    body = order == "auto" and not (given or timed or drowned or has_velocities(problem))
-    body = body and accelerated(problem.curves)
+    body = order == "auto" and not (given or timed or drowned)
+    body = body and accelerated(problem.curves) and not has_velocities(problem)
     if body and whole:
         linear = _of_forces(task, 1)  # no law of first order holds: its search would be in vain
         if linear and not linear.warnings and not _swing(task, problem, places=False):

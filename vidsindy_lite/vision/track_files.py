@@ -61,7 +61,6 @@ _FRAME = (
     "frame", "frames", "step", "n", "frame_idx", "frame_id", "frame_number", "frame_no", "frameid",
     "frame_index", "framenumber", "frame_num", "frame_n", "fnum", "slice", "slice_n", "image",
 )  # fmt: skip
-_ROW = ("index",)  # of a table: where it leaves some out, these are frames without a target
 _PIXELS = (
     ("u", "v"), ("pixelx", "pixely"), ("x", "y"), ("x_px", "y_px"), ("position_x", "position_y"),
 )  # fmt: skip
@@ -193,8 +192,8 @@ def _tracks(
         rows = [row for row in rows if row[who] == chosen]
     frame = _column(names, _FRAME)
     counted = frame is not None
-    if frame is None and who is None:
-        frame = _column(names[:1], _ROW)
+    if names[:1] == ["index"] and frame is None and who is None:
+        frame = 0  # of the rows of a table: those that are left out are frames without a target
     values = _numbers(rows, width, names, frame)
     if frame is not None:
         # Images may be called by their times, and what is called image or n may be anything.
@@ -300,7 +299,7 @@ def _plain(cell: str) -> str:
 
 
 def _is_of_numbers(row: Sequence[str]) -> bool:
-    """Whether a line holds values: numbers or nothing, but for a name in front."""
+    """Whether a line holds values: numbers in half of its cells that are filled, or nothing."""
     filled = [_number(cell) for cell in row if cell.strip()]
     numbers = [number for number in filled if number is not None]
     real = bool(np.isfinite(numbers).any())
