@@ -374,7 +374,7 @@ def adjust(
     """
     change = np.zeros(errors.shape) if begin is None else begin
     state = Adjustment(footage, tuple(start), errors, change, np.zeros((0, 3)))
-    points, _ = intersect(state.cameras, at_once(state.cameras, state.footage.aligned))
+    points = intersect(state.cameras, at_once(state.cameras, state.footage.aligned))
     seen = points[np.isfinite(points).all(axis=1)]
     reach = (float(np.sqrt(np.mean(np.var(seen, axis=0)))) if len(seen) else 1.0) or 1.0
     state = replace(state, points=points, reach=reach)

@@ -325,7 +325,7 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     views, seen = check_views(tracks, rig), check_seen(tracks, rig)
     errors = np.array([known_to(camera) for camera in rig.cameras])
     start = closed_form(views, rig.cameras)
-    if not np.isfinite(intersect(start, views)[0]).any():
+    if not np.isfinite(intersect(start, views)).any():
         raise ValueError(
             "rig: the lines of sight must meet in front of the cameras, got none that do (do two "
             "views share frames, and does each normal point from the scene to its camera?)"
@@ -351,13 +351,6 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
             f"the {what} of cameras[{i}] is {off.max():.1f} times its error from what was measured "
             f"(of all cameras chi-square {squares:.0f}, where some {told:.0f} are expected): check "
             "it, how the others were measured, and whether the tracks are in their order",
-        )
-    left = int((~intersect(found.cameras, views)[1]).sum())
-    if left:
-        doubts += (
-            f"the target's place is uncertain in {left} of {len(views[0])} frames, where the lines "
-            "of sight hardly cross: the cameras look along nearly the same line there, or one of "
-            "them is wrong",
         )
     return Rig(found.cameras, doubts, rig.note)
 

@@ -672,7 +672,7 @@ def independent(cameras: Sequence[Camera]) -> bool:
 
 def missed(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> list[Floats]:
     """`residuals` of tracks that were checked."""
-    x, _ = intersect(cameras, tracks)
+    x = intersect(cameras, tracks)
     return [track - camera.image(x) for track, camera in zip(tracks, cameras, strict=True)]
 
 
@@ -694,7 +694,7 @@ def trimmed(residual: Floats, share: float = TRIMMED) -> float:
 
 
 @np.errstate(all="ignore")  # lines that hardly cross may send a point far away
-def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floats, Bools]:
+def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> Floats:
     """Points that calibrated cameras of any model see at given pixels, by least squares in pixels.
 
     The linear equations, in scene units, are the start of a Gauss-Newton search for the least
@@ -708,10 +708,8 @@ def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floa
 
     Returns
     -------
-    x : ndarray, shape (n, 3)
+    ndarray, shape (n, 3)
         Scene units; NaN where all lines of sight are parallel, or meet behind a camera.
-    settled : ndarray of bool, shape (n,)
-        Whether the search for a point came to its end.
     """
     matrices = np.array([camera.matrix for camera in cameras])
     scales = np.array([camera.calibration[0] for camera in cameras])
@@ -739,7 +737,7 @@ def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floa
             break
     depth = x @ matrices[:, 2, :3].T + matrices[:, 2, 3]
     x[(visible & (depth <= 0)).any(axis=1) | ~crossing] = np.nan
-    return x, ~np.isin(np.arange(len(x)), active)
+    return x
 
 
 def epipolar_lines(known: Camera, pixels: Floats, unknown: Camera) -> tuple[Floats, Floats]:

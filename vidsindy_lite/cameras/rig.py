@@ -347,7 +347,7 @@ def reconstruct(tracks: Sequence[Floats], rig: Rig) -> Floats:
         If the tracks do not match the rig or a camera is not calibrated.
     """
     check_calibrated("rig", rig)
-    return intersect(rig.cameras, check_views(tracks, rig))[0]
+    return intersect(rig.cameras, check_views(tracks, rig))
 
 
 def residuals(tracks: Sequence[Floats], rig: Rig) -> list[Floats]:

@@ -249,7 +249,7 @@ def _in_space(runs: Sequence[_Run], cameras: Sequence[Camera]) -> tuple[Ints, Fl
     views = np.full((len(cameras), n, count, 2), np.nan)
     for run in runs:
         views[run.view, run.frames] = run.places
-    x, _ = intersect(cameras, at_once(cameras, _rows([*views])))
+    x = intersect(cameras, at_once(cameras, _rows([*views])))
     x = side_by_side(x, count).reshape(n, count, 3)
     frames = np.flatnonzero(np.isfinite(x).all(axis=(1, 2)))
     return frames, x[frames]
