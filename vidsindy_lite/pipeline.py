@@ -362,12 +362,12 @@ def _several_observed(
     tracks = [np.hstack(views) for views in zip(*aligned, strict=True)]
     rig = cameras.paced(rig, clock.rates)
     with refusing("cameras", tracks, names):
-        who = cameras.identify(tracks, rig)
-    rows = [cameras.stacked(track, 2) for track in who.tracks]
+        told, unsure = cameras.identify(tracks, rig)
+    rows = [cameras.stacked(track, 2) for track in told]
     t, step = clock.times, np.diff(clock.times).min()
     later = (t[-1] - t[0] + 2 * step) * np.arange(count)[:, None]
     long = Clock.of_tracks((np.append(t, t[-1] + step) + later).ravel()[:-1], rows)
-    seen = _observed(rows, rig, long, 0 * begun, names, (*doubts, *who.doubts), progress)
+    seen = _observed(rows, rig, long, 0 * begun, names, (*doubts, *unsure), progress)
     modes = [cameras.side_by_side(mode, count) for mode in seen.systematic]
     x = cameras.side_by_side(seen.x, count)
     lost = np.flatnonzero(np.isnan(x).any(axis=1))

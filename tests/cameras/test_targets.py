@@ -55,9 +55,9 @@ def test_orthographic_views_whose_cameras_are_not_learned_yet(seed, count):
     rig = vl.Rig.around(np.concatenate(paths) + middle)
     paths = [x + middle for x in paths]
     tracks, views = filmed(rig, paths, rng)
-    told = identify(tracks, rig.uncalibrated(keep=0))
-    if not told.doubts:  # all views may be blind at once, just when two targets meet in space
-        assert_told_apart(told.tracks, views)
+    told, doubts = identify(tracks, rig.uncalibrated(keep=0))
+    if not doubts:  # all views may be blind at once, just when two targets meet in space
+        assert_told_apart(told, views)
 
 
 @pytest.mark.parametrize("twin", [False, True])
@@ -68,13 +68,13 @@ def test_a_meeting_that_one_view_alone_does_not_see_costs_its_frames_only(twin):
     views = [view.reshape(FRAMES, -1) for view in views]
     views[1][100:] = np.roll(views[1][100:], 2, axis=1)
     views[1][95:105] = np.nan
-    told = identify(views, rig)
-    assert not told.doubts
+    told, doubts = identify(views, rig)
+    assert not doubts
     for i, view in enumerate(truth):
         expected = view.reshape(FRAMES, -1)
-        seen = np.isfinite(told.tracks[i]).all(axis=1)
+        seen = np.isfinite(told[i]).all(axis=1)
         assert seen.sum() == FRAMES - 10 * (i == 1)
-        np.testing.assert_allclose(told.tracks[i][seen], expected[seen])
+        np.testing.assert_allclose(told[i][seen], expected[seen])
 
 
 def two_walks(seed):
@@ -92,9 +92,9 @@ def test_a_view_may_be_blind_between_two_gaps_in_all_views():
         for gap in (slice(97, 103), slice(137, 143)):
             track[gap] = np.nan
     tracks[0][97:143] = np.nan
-    told = identify([track.reshape(FRAMES, -1) for track in tracks], rig)
-    assert not told.doubts
-    assert_told_apart(told.tracks, views)
+    told, doubts = identify([track.reshape(FRAMES, -1) for track in tracks], rig)
+    assert not doubts
+    assert_told_apart(told, views)
 
 
 def fallen(low, high, unseen):
@@ -114,24 +114,24 @@ def fallen(low, high, unseen):
 @pytest.mark.parametrize(("low", "high"), [(-1.0, 0.6), (-0.6, 1.0)])
 def test_of_targets_that_meet_in_space_unseen_the_longer_part_alone_is_told(low, high):
     t, rig, views, tracks = fallen(low, high, 0.1)
-    told = identify([track.reshape(FRAMES, -1) for track in tracks], rig)
+    told, doubts = identify([track.reshape(FRAMES, -1) for track in tracks], rig)
     longer = np.abs(t) > 0.1
     longer &= (t < 0) if high < -low else (t > 0)
-    for track, view in zip(told.tracks, views, strict=True):
+    for track, view in zip(told, views, strict=True):
         np.testing.assert_array_equal(np.isfinite(track).all(axis=1), longer)
         places = track.reshape(FRAMES, 2, 2)[longer]
         off = [np.abs(places - view[longer][:, order]).max() for order in ([0, 1], [1, 0])]
         assert min(off) < 1e-9
-    assert len(told.doubts) == 1
+    assert len(doubts) == 1
     left = int(((np.abs(t) > 0.1) & ~longer).sum())
-    assert told.doubts[0].startswith(f"targets: {left} frames are left out, e.g. from frame ")
+    assert doubts[0].startswith(f"targets: {left} frames are left out, e.g. from frame ")
 
 
 def test_where_two_orders_go_on_about_as_smoothly_nobody_is_sure():
     t, rig, _, tracks = fallen(-1.0, 0.6, 0.04)  # so short that smoothness could tell
-    told = identify([track.reshape(FRAMES, -1) for track in tracks], rig)
-    assert len(told.doubts) == 1
-    assert all(np.isnan(track[t > 0]).all() for track in told.tracks)
+    told, doubts = identify([track.reshape(FRAMES, -1) for track in tracks], rig)
+    assert len(doubts) == 1
+    assert all(np.isnan(track[t > 0]).all() for track in told)
 
 
 def test_views_that_never_show_all_targets_at_once_or_other_things_are_refused():

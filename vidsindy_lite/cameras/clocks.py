@@ -151,12 +151,17 @@ class Curve:
         return np.asarray(np.isfinite(self.track).all(axis=1))
 
     @cached_property
+    def _seen(self) -> tuple[Floats, Floats]:
+        """Numbers and places of the frames that show the target; of all if none does, and NaN."""
+        rows = self.shown if self.shown.any() else slice(None)
+        return self.clock[rows], self.track[rows]
+
+    @cached_property
     def _spline(self) -> BSpline:
-        count = int(self.shown.sum())
         # Where a frame was dropped, a cubic is off by some ten times as much as between two frames.
         degree = 3 if _is_even(self.clock) else 5
-        seen = self.clock[self.shown], self.track[self.shown]
-        return make_interp_spline(*seen, k=min(degree, count - 1))
+        most = len(self._seen[0]) - 1
+        return make_interp_spline(*self._seen, k=min(degree, most), check_finite=False)
 
     def at(self, frames: Floats) -> Floats:
         """Pixels, (..., 2).
@@ -164,8 +169,6 @@ class Curve:
         NaN outside, and unless the target is seen in the frames before and after, and these are
         close to each other.
         """
-        if not self.shown.any():
-            return np.full((*np.shape(frames), 2), np.nan)
         within = np.clip(frames, self.clock[0], self.clock[-1])
         low = np.searchsorted(self.clock, within, "right") - 1
         high = np.searchsorted(self.clock, within, "left")
@@ -180,22 +183,18 @@ class Curve:
 
         NaN where it was, and where they are not all within the video.
         """
-        if not self.shown.any():
-            return self
         window = self.clock[:, None] + step * np.arange(-2, 3)
         inside = (window >= self.clock[0]).all(axis=1) & (window <= self.clock[-1]).all(axis=1)
         means = np.array([1, 4, 6, 4, 1]) / 16 @ self._spline(window)
         return Curve(np.where((self.shown & inside)[:, None], means, np.nan), self.clock)
 
     def slope(self, frames: Floats) -> Floats:
-        """Pixels a frame, (n, 2), from the frame before to the frame after; finite everywhere.
+        """Pixels a frame, (n, 2), from the frame before to the frame after.
 
         Over whole frames, the noise of such a difference does not depend on that of the value
-        between them: both ends share as much with it. Zero where no frame shows the target.
+        between them: both ends share as much with it.
         """
-        if not self.shown.any():
-            return np.zeros((*np.shape(frames), 2))
-        seen = self.clock[self.shown]
+        seen, _ = self._seen
         back, on = (np.clip(frames + step, seen[0], seen[-1]) for step in (-1, 1))
         width = np.maximum(on - back, 1)[..., None]
         return (self._spline(on) - self._spline(back)) / width

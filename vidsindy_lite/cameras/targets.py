@@ -14,7 +14,6 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations, product
-from typing import NamedTuple
 
 import numpy as np
 
@@ -25,13 +24,6 @@ from .rig import ALIKE, Rig
 
 _SHORTEST = 4  # frames of a run, and of what two runs have in common
 _AHEAD, _DEGREE = 6, 4  # frames on both sides of a gap, through which a target goes like t^4
-
-
-class Identities(NamedTuple):
-    """Tracks (n, 2 k) of each view in which each pair of columns is one target; and doubts."""
-
-    tracks: list[Floats]
-    doubts: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +55,7 @@ def side_by_side(rows: Floats, count: int) -> Floats:
     return np.hstack([rows[i * (n + 1) : i * (n + 1) + n] for i in range(count)])
 
 
-def identify(tracks: Sequence[Floats], rig: Rig) -> Identities:
+def identify(tracks: Sequence[Floats], rig: Rig) -> tuple[list[Floats], list[str]]:
     """Give each target its own columns in all views, from left to right as the first view begins.
 
     Only the longest part in which that is sure is told; elsewhere the tracks are NaN.
@@ -75,6 +67,13 @@ def identify(tracks: Sequence[Floats], rig: Rig) -> Identities:
         wherever two of them meet or one is not seen.
     rig : Rig
         One camera per view, at least three; see `learn_cameras`.
+
+    Returns
+    -------
+    tracks : list of ndarray, shape (n, 2 k)
+        In which each pair of columns is one target.
+    doubts : list of str
+        What was left out, and why.
 
     Raises
     ------
@@ -95,13 +94,13 @@ def identify(tracks: Sequence[Floats], rig: Rig) -> Identities:
     flat = [view.reshape(len(view), -1) for view in told]
     left = sum(_size(part, cameras)[1] for part in others)
     if left < 0.05 * len(views[0]):  # a few frames that are left out do no harm
-        return Identities(flat, ())
+        return flat, []
     doubt = (
         f"targets: {left} frames are left out, e.g. from frame {min(map(_first, others))} on: who "
         "is who there is not sure, as in between no two views tell the targets apart, and in space "
         "they meet, or are lost for too long"
     )
-    return Identities(flat, (doubt,))
+    return flat, [doubt]
 
 
 def _parts(groups: Sequence[Sequence[_Run]], cameras: Sequence[Camera]) -> list[list[_Run]]:
