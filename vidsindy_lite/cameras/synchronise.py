@@ -472,7 +472,7 @@ def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | No
     names : sequence of str
         What the videos are called.
     """
-    start, found = given.lags, list[Mistake]()
+    start = given.lags
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
         begun = _near(given, rig)
         left = min(map(_worst, begun), default=np.inf)
@@ -480,45 +480,46 @@ def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | No
             return None
         # Whole views are not mistaken where most frames agree.
         most = min((fit.left() for fit in begun), default=np.inf) <= 2 * DISAGREEMENT
-        for kind in (_dropped,) if most else (_dropped, _whole):
-            if found and found[-1].lags.residual <= DISAGREEMENT:
+        ways = [*_dropped(given, rig, names), *(() if most else _whole(given, rig, names))]
+        # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse none.
+        ranked = [
+            (*_paired(mended, known.cameras), what, mended, known) for what, mended, known in ways
+        ]
+        # Those that mend most, with all cameras.
+        tried = [
+            (_worst(fit), fit, what, mended, known)
+            for _, best, what, mended, known in sorted(ranked, key=itemgetter(0))[:16]
+            for fit in _fits(mended, known, start, best)
+        ]
+        for now, fit, what, mended, known in sorted(tried, key=itemgetter(0)):
+            # Times by which it has to mend the disagreement of all views together.
+            if now > GROSS or 3.0 * now >= left:
                 break
-            # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse
-            # none.
-            ranked = [
-                (*_paired(mended, known.cameras), what, mended, known)
-                for what, mended, known in kind(given, rig, names)
-            ]
-            # Of a kind those that mend most, with all cameras.
-            tried = [
-                (_worst(fit), fit, what, mended, known)
-                for _, best, what, mended, known in sorted(ranked, key=itemgetter(0))[:16]
-                for fit in _fits(mended, known, start, best)
-            ]
-            for now, fit, what, mended, known in sorted(tried, key=itemgetter(0)):
-                # Times by which it has to mend the disagreement of all views together.
-                if now > GROSS or 3.0 * now >= left:
-                    break
-                lags = fit.footage.lags
-                told = learn_lags(mended.tracks, known, mended.rates, lags, mended.clocks)
-                if told.agree and told.residual <= 2 * DISAGREEMENT:
-                    others = [o for n, _, o, *_ in tried if n <= ALIKE * max(now, FINE)]
-                    alike = ", and ".join(dict.fromkeys(o for o in others if o != what))
-                    text = (
-                        f"the rig does not agree with the tracks as they are given: {what} "
-                        f"explains it ({told.residual:.2g} pixels apart instead of {left:.3g}), "
-                        "and was put right here: do so in what is given"
-                    ) + (f"; as well do {alike}: another path" if alike else "")
-                    found.append(Mistake(text, mended, known, told))
-                    break
-    best = min(found, key=lambda one: one.lags.residual, default=None)
-    moved = 0.0 if best is None else np.abs(best.lags.frames - start).sum()
-    if best and moved > 1:  # smaller lags may explain it as well, of a motion that repeats itself
-        told = learn_lags(given.tracks, rig, given.rates, start, given.clocks)
-        as_well = told.residual <= ALIKE * max(best.lags.residual, FINE)
-        if told.agree and as_well and np.abs(told.frames - start).sum() + 1 < moved:
-            return None
-    return best
+            lags = fit.footage.lags
+            told = learn_lags(mended.tracks, known, mended.rates, lags, mended.clocks)
+            if not told.agree or told.residual > 2 * DISAGREEMENT:
+                continue
+            if _as_well(given, rig, told):
+                break
+            others = [o for n, _, o, *_ in tried if n <= ALIKE * max(now, FINE)]
+            alike = ", and ".join(dict.fromkeys(o for o in others if o != what))
+            text = (
+                f"the rig does not agree with the tracks as they are given: {what} explains it "
+                f"({told.residual:.2g} pixels apart instead of {left:.3g}), and was put right "
+                "here: do so in what is given"
+            ) + (f"; as well do {alike}: another path" if alike else "")
+            return Mistake(text, mended, known, told)
+    return None
+
+
+def _as_well(given: Footage, rig: Rig, mended: Lags) -> bool:
+    """Whether smaller lags explain it as well, of a motion that repeats itself."""
+    moved = np.abs(mended.frames - given.lags).sum()
+    if moved <= 1:
+        return False
+    told = learn_lags(given.tracks, rig, given.rates, given.lags, given.clocks)
+    smaller = np.abs(told.frames - given.lags).sum() + 1 < moved
+    return bool(told.agree and smaller and told.residual <= ALIKE * max(mended.residual, FINE))
 
 
 def _worst(fit: Adjustment) -> float:

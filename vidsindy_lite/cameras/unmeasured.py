@@ -27,11 +27,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations, product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from ..arrays import Floats
@@ -44,7 +43,6 @@ _FEWEST = 8  # frames in common of a pair
 _VIEWS = np.geomspace(2, 90, 15)  # degrees across an image: what lenses have
 _STEPS = 30  # of each search
 
-_Pose = tuple[NDArray[Any], NDArray[Any]]  # OpenCV's rotation and shift
 _NOTE = (
     "nothing is known of the cameras: the path is known but for an affine map, its axes are those "
     "of its spread, largest first; of a linear law frequencies and dampings do not depend on it"
@@ -158,9 +156,8 @@ def _around(
     )
     points = np.full((len(rays[0]), 3), np.nan)
     points[both] = np.where(front > 0, (homogeneous[:3] / homogeneous[3]).T, np.nan)
-    poses: dict[int, _Pose] = {
-        i: (np.eye(3), np.zeros(3)), j: (np.asarray(turn), np.asarray(shift)[:, 0])
-    }  # fmt: skip
+    turns, shifts = np.array([np.eye(3)] * len(rays)), np.zeros((len(rays), 3))
+    turns[j], shifts[j] = turn, shift[:, 0]
     for k in set(range(len(cameras))) - set(pair):
         told = np.isfinite(points).all(axis=1) & np.isfinite(rays[k]).all(axis=1)
         if told.sum() < _FEWEST:
@@ -174,8 +171,7 @@ def _around(
             return None
         if not done:
             return None
-        poses[k] = np.asarray(cv2.Rodrigues(axis)[0]), np.asarray(place)[:, 0]
-    turns, shifts = map(np.array, zip(*(poses[k] for k in sorted(poses)), strict=True))
+        turns[k], shifts[k] = cv2.Rodrigues(axis)[0], place[:, 0]
     turns = turns @ turns[0].T
     shifts = shifts - turns @ shifts[0]
     each = zip(cameras, turns * [1, -1, -1], shifts / np.linalg.norm(shifts[1]), strict=True)
