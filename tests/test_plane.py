@@ -119,7 +119,7 @@ def test_motions_that_are_no_plain_flight():
 def placed(pixels, length=None, up=None, corners=None, size=(1280, 720)):
     """Where pixels are in the plane."""
     marks, places, _ = plane.four_places(length, up, corners, size)
-    return plane.mapped(plane.homography_of(marks, places), np.array(pixels))
+    return plane.carry(plane.homography_of(marks, places), np.array(pixels))
 
 
 def test_two_marks_and_a_length():
@@ -134,9 +134,9 @@ def test_two_marks_and_a_length():
 def test_four_marks_of_a_rectangle_that_is_seen_askew():
     askew = np.array([[200.0, 20, 300], [-10, -180, 600], [0.05, 0.02, 1]])
     places = np.array([[0.0, 0], [2, 0], [2, 1], [0, 1], [0.7, 0.4]])
-    marks = plane.mapped(askew, places)
+    marks = plane.carry(askew, places)
     np.testing.assert_allclose(placed(marks, corners=(*marks[:4].ravel(), 2, 1)), places, atol=1e-9)
-    leans = plane.mapped(askew, np.array([[1.0, 0.5], [1.001, 0.501]]))  # at 45 degrees
+    leans = plane.carry(askew, np.array([[1.0, 0.5], [1.001, 0.501]]))  # at 45 degrees
     turned = placed(marks, corners=(*marks[:4].ravel(), 2, 1), up=np.diff(leans, axis=0)[0])
     np.testing.assert_allclose(turned[1], [np.sqrt(2), np.sqrt(2)], atol=5e-3)
 

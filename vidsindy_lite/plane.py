@@ -32,7 +32,7 @@ from .pipeline import (
     with_law,
     without_wild,
 )
-from .vision import Hint, check_detector, frame_clock, read_tracks, video_info
+from .vision import Hint, carry, check_detector, frame_clock, read_tracks, video_info
 
 MARK = 1.0  #: Standard error of a mark that is set by hand, in pixels.
 #: What pulls at all bodies, in metres a second squared, and by how much it differs on earth.
@@ -64,7 +64,7 @@ class PlaneCamera(OrthographicCamera):
 
     def image(self, x: Floats) -> Floats:
         """Pixels at which points of the plane are seen, (n, 2)."""
-        return mapped(np.asarray(np.linalg.inv(self.homography), float), x[:, :2])
+        return carry(np.asarray(np.linalg.inv(self.homography), float), x[:, :2])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -188,9 +188,9 @@ def discover_from_video(
     unit = "m" if measured else "px"
     scale = f", their scale known to {100 * error:.2g} % at the marks" if measured else ""
     middle, centre = marks.mean(axis=0), (np.array(size) - 1) / 2
-    across = complex(*np.diff(mapped(to_plane, middle + [[0.0, 0], [1, 0]]), axis=0)[0])
+    across = complex(*np.diff(carry(to_plane, middle + [[0.0, 0], [1, 0]]), axis=0)[0])
     camera = PlaneCamera(
-        homography=to_plane, position=mapped(to_plane, centre[None])[0] @ SPACE,
+        homography=to_plane, position=carry(to_plane, centre[None])[0] @ SPACE,
         normal=np.array([0, 0, 1]), scale=abs(across), angle=-float(np.angle(across)),
         scale_error=error, image_size=size,
     )  # fmt: skip
@@ -202,7 +202,7 @@ def discover_from_video(
     pixels, left_out = without_wild(pixels, name)
     pixels, held = _let_go(pixels, first) if frames is None else (pixels, "")
     rig = noted(rig, left_out, held)
-    x = mapped(to_plane, pixels)
+    x = carry(to_plane, pixels)
     known = slice(3 if corners is None else 1) if measured else slice(0)
     modes = np.stack([error * x, *_tilts(camera, pixels, middle)])[known]
     seen = Observation(
@@ -318,7 +318,7 @@ def four_places(
                 f"and two sides above 0, got {given.tolist()}"
             )
         if up is not None:  # of the plane, as it is seen at the middle of the rectangle
-            seen = mapped(homography_of(marks, places), marks.mean(axis=0) + [0 * upwards, upwards])
+            seen = carry(homography_of(marks, places), marks.mean(axis=0) + [0 * upwards, upwards])
             s, c = (seen[1] - seen[0]) / np.hypot(*(seen[1] - seen[0]))
             places = places @ np.array([[c, s], [-s, c]])
         return marks, places, float(np.hypot(*edges.T).min())
@@ -369,12 +369,6 @@ def homography_of(marks: Floats, places: Floats) -> Floats:
     return np.append(np.linalg.solve(np.vstack(rows), places.T.ravel()), 1.0).reshape(3, 3)
 
 
-def mapped(homography: Floats, places: Floats) -> Floats:
-    """Places, (n, 2), where a homography takes them."""
-    there = np.column_stack([places, np.ones(len(places))]) @ homography.T
-    return there[:, :2] / there[:, 2:]
-
-
 def _tilts(camera: PlaneCamera, pixels: Floats, middle: Floats) -> list[Floats]:
     """By how much places are off, (n, 2), where the camera looks askew by one standard error.
 
@@ -384,8 +378,8 @@ def _tilts(camera: PlaneCamera, pixels: Floats, middle: Floats) -> list[Floats]:
     away = pixels - middle
     # The focal length of a telephone over the longer side of its picture.
     nearer = TILTED * away / (0.75 * max(camera.image_size))
-    x = mapped(camera.homography, pixels)
-    return [mapped(camera.homography, pixels + nearer[:, [j]] * away) - x for j in (0, 1)]
+    x = carry(camera.homography, pixels)
+    return [carry(camera.homography, pixels + nearer[:, [j]] * away) - x for j in (0, 1)]
 
 
 def _contradicted(found: PlaneDiscovery, vertical: bool, askew: bool) -> list[str]:

@@ -39,7 +39,6 @@ from .clocks import OVERLAP, Footage, Lags, dips, untold_lags
 from .models import ROUNDING, AffineCamera, PerspectiveCamera, at_once, missed
 from .rig import ALIKE, BETTER, FINE, GROSS, Rig, check_views
 
-_FEWEST = 8  # frames in common of a pair
 _VIEWS = np.geomspace(2, 90, 15)  # degrees across an image: what lenses have
 _STEPS = 30  # of each search
 
@@ -142,40 +141,32 @@ def _around(
     """
     i, j = pair
     both = np.isfinite(rays[i]).all(axis=1) & np.isfinite(rays[j]).all(axis=1)
-    if both.sum() < _FEWEST:
-        return None
     seen, centre = (rays[i][both], rays[j][both]), np.eye(3)
-    essential, mask = cv2.findEssentialMat(
-        *seen, centre, method=cv2.USAC_ACCURATE, prob=0.9999,
-        threshold=GROSS / min(cameras[k].focal_length for k in pair),
-    )  # fmt: skip
-    if essential is None or essential.shape != (3, 3):
-        return None
-    _, turn, shift, front, homogeneous = cv2.recoverPose(
-        essential, *seen, centre, distanceThresh=50.0, mask=mask
-    )
     points = np.full((len(rays[0]), 3), np.nan)
-    points[both] = np.where(front > 0, (homogeneous[:3] / homogeneous[3]).T, np.nan)
     turns, shifts = np.array([np.eye(3)] * len(rays)), np.zeros((len(rays), 3))
-    turns[j], shifts[j] = turn, shift[:, 0]
-    for k in set(range(len(cameras))) - set(pair):
-        told = np.isfinite(points).all(axis=1) & np.isfinite(rays[k]).all(axis=1)
-        if told.sum() < _FEWEST:
-            return None
-        try:
-            done, axis, place, _ = cv2.solvePnPRansac(
+    try:
+        essential, mask = cv2.findEssentialMat(
+            *seen, centre, method=cv2.USAC_ACCURATE, prob=0.9999,
+            threshold=GROSS / min(cameras[k].focal_length for k in pair),
+        )  # fmt: skip
+        _, turns[j], shift, front, homogeneous = cv2.recoverPose(
+            essential, *seen, centre, distanceThresh=50.0, mask=mask
+        )
+        shifts[j] = shift[:, 0]
+        points[both] = np.where(front > 0, (homogeneous[:3] / homogeneous[3]).T, np.nan)
+        for k in set(range(len(cameras))) - set(pair):
+            told = np.isfinite(points).all(axis=1) & np.isfinite(rays[k]).all(axis=1)
+            _, axis, place, _ = cv2.solvePnPRansac(
                 points[told], rays[k][told], centre, None, flags=cv2.SOLVEPNP_SQPNP,
                 reprojectionError=3 * GROSS / cameras[k].focal_length,
             )  # fmt: skip
-        except cv2.error:  # points of one draw lie too close together
-            return None
-        if not done:
-            return None
-        turns[k], shifts[k] = cv2.Rodrigues(axis)[0], place[:, 0]
-    turns = turns @ turns[0].T
-    shifts = shifts - turns @ shifts[0]
-    each = zip(cameras, turns * [1, -1, -1], shifts / np.linalg.norm(shifts[1]), strict=True)
-    return tuple(camera.posed(turn, shift) for camera, turn, shift in each)
+            turns[k], shifts[k] = cv2.Rodrigues(axis)[0], place[:, 0]
+        turns = turns @ turns[0].T
+        shifts = shifts - turns @ shifts[0]
+        each = zip(cameras, turns * [1, -1, -1], shifts / np.linalg.norm(shifts[1]), strict=True)
+        return tuple(camera.posed(turn, shift) for camera, turn, shift in each)
+    except (cv2.error, ValueError):  # too few points, too close together, or of nothing that moves
+        return None
 
 
 def _framed(rig: Rig, fit: Adjustment) -> Rig:
