@@ -283,18 +283,17 @@ def _observed(
                 if affine is None:
                     raise
                 return affine
-    first: list[str] = []
+    first = list[str]()
+    mistake = None if synchronous else cameras.find_mistake(films, rig, names)
     if synchronous:
         best = Lags(films.lags, films.rates, films.lags, 0.0, clocks=films.uneven)
+    elif mistake is not None:  # and is put right, as nothing can be learned with it
+        first, films, best, lags = [mistake.text], mistake.footage, mistake.lags, None
+        rig = cameras.paced(mistake.rig, films.rates / clock.rates)
+        raw, clock = films.tracks, clock.mended(films)
     else:
-        start, mistake = lags, cameras.find_mistake(films, rig, names)
-        if mistake is not None:  # and is put right, as nothing can be learned with it
-            first, films = [mistake.text], mistake.footage
-            rig = cameras.paced(mistake.rig, films.rates / clock.rates)
-            raw, clock = films.tracks, clock.mended(films)
-            lags, start = None, mistake.lags.frames
         with refusing("lags", raw, names):
-            best = cameras.learn_lags(raw, rig, clock.rates, start, clock.frames, progress=progress)
+            best = cameras.learn_lags(raw, rig, clock.rates, lags, clock.frames, progress=progress)
             if lags is not None and _apart(lags, best, 0.5):  # frames
                 raise ValueError(
                     f"lags: must make the views agree, got ({cameras.list_lags(lags)}) frames "
