@@ -286,7 +286,7 @@ def _observed(
     first = list[str]()
     mistake = None if synchronous else cameras.find_mistake(films, rig, names)
     if synchronous:
-        best = Lags(films.lags, films.rates, films.lags, 0.0, clocks=films.uneven)
+        best = Lags(films.lags, films.rates, films.lags, 0.0, clocks=films.clocks)
     elif mistake is not None:  # and is put right, as nothing can be learned with it
         first, films, best, lags = [mistake.text], mistake.footage, mistake.lags, None
         rig = cameras.paced(mistake.rig, films.rates / clock.rates)

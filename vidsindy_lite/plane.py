@@ -205,8 +205,9 @@ def discover_from_video(
     x = carry(to_plane, pixels)
     known = slice(3 if corners is None else 1) if measured else slice(0)
     modes = np.stack([error * x, *_tilts(camera, pixels, middle)])[known]
+    zero, clock = np.zeros(1), np.arange(len(t), dtype=float)
     seen = Observation(
-        tracks=(pixels,), rig=rig, lags=Lags(np.zeros(1), np.ones(1), np.zeros(1), 0.0),
+        tracks=(pixels,), rig=rig, lags=Lags(zero, zero + 1, zero, 0.0, clocks=(clock,)),
         t=t, x=x @ SPACE, systematic=modes @ SPACE, warnings=tuple(warnings),
     )  # fmt: skip
     # A plane that lies askew bends a path a little as other forces would.

@@ -397,7 +397,9 @@ def test_given_times_are_those_of_an_uneven_file_but_for_a_quarter_of_a_frame(of
 
 
 def test_a_frame_is_that_of_the_instant():
-    lags = Lags(np.array([0, 2.0, -3.5]), np.array([1, 1, 2.0]), np.zeros(3), 0.0)
+    ticks = (np.arange(30.0),) * 3
+    lags = Lags(np.array([0, 2.0, -3.5]), np.array([1, 1, 2.0]), np.zeros(3), 0.0, clocks=ticks)
+    assert lags.frame_at(1, 1) == -1  # it has not begun
     assert [lags.frame_at(i, 10) for i in range(3)] == [10, 8, 27]
     ticks = np.arange(9.0), np.array([0, 1, 3, 4, 5, 7, 8, 9.0])
     dropped = Lags(np.array([0, 1.0]), np.ones(2), np.zeros(2), 0.0, clocks=ticks)

@@ -48,7 +48,8 @@ def case(tmp_path_factory):
     tracks[2] = np.where(np.arange(150)[:, None] < 5, np.nan, tracks[2])
     x[:5] = np.nan
     law = vl.discover(t, x, degree=2)
-    lags = Lags(np.array([0, 3.5, 0]), np.ones(3), np.array([0, 0.01, np.inf]), 0.1)
+    late, errors = np.array([0, 3.5, 0]), np.array([0, 0.01, np.inf])
+    lags = Lags(late, np.ones(3), errors, 0.1, clocks=(np.arange(150.0),) * 3)
     seen = Observation(tuple(tracks), rig, lags, t, x, np.empty((0, *x.shape)), law.warnings)
     return vl.VideoDiscovery(**vars(seen), discovery=law), paths
 
@@ -280,7 +281,8 @@ def observed(tmp_path, frames):
     paths = [vl.render_video(tmp_path / "a.mov", tracks[0], scene)]
     paths.append(vl.render_video(tmp_path / "b.mov", tracks[1][LATER:], scene))
     tracks[1][:LATER] = np.nan
-    lags = Lags(np.array([0.0, LATER]), np.ones(2), np.zeros(2), 0.0)
+    clocks = np.arange(1.0 * frames), np.arange(1.0 * frames - LATER)
+    lags = Lags(np.array([0.0, LATER]), np.ones(2), np.zeros(2), 0.0, clocks=clocks)
     rig = vl.Rig(rig.cameras[:2])
     seen = Observation(tuple(tracks), rig, lags, t, x, np.empty((0, *x.shape)), ())
     return vl.VideoDiscovery(**vars(seen), discovery=vl.discover(t, x, degree=2)), paths

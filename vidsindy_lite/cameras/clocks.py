@@ -47,7 +47,7 @@ class Lags:
     warnings : tuple of str
         Why the lags should not be trusted, with advice.
     clocks : tuple of ndarray, shape (n_i,)
-        When each frame was taken, see `align`; empty if all videos are even.
+        When each frame was taken, see `align`.
     rate_errors : ndarray, shape (m,)
         Standard errors of the rates that were learned, zero of the others; empty if none was.
     """
@@ -66,11 +66,9 @@ class Lags:
         return bool(np.isfinite(self.errors).all())
 
     def frame_at(self, i: int, instant: int) -> int:
-        """Which frame of video i is closest to one of the first."""
-        if not self.clocks:
-            return int(np.rint((instant - self.frames[i]) * self.rates[i]))
-        sought = (self.clocks[0][instant] - self.frames[i]) * self.rates[i]
-        return int(np.abs(self.clocks[i] - sought).argmin())
+        """Which frame of video i is closest to one of the first; below 0 if none was yet."""
+        clock, sought = self.clocks[i], (self.clocks[0][instant] - self.frames[i]) * self.rates[i]
+        return int(np.rint(np.interp(sought, clock, np.arange(len(clock)), -1, len(clock))))
 
 
 def align(
@@ -236,11 +234,6 @@ class Footage:
     def clocks(self) -> tuple[Floats, ...]:
         """When each frame of each video was taken, see `align`."""
         return tuple(curve.clock for curve in self.curves)
-
-    @property
-    def uneven(self) -> tuple[Floats, ...]:
-        """The clocks, if that of any video is not 0, 1, 2, ..."""
-        return () if all(map(_is_even, self.clocks)) else self.clocks
 
     @property
     def lengths(self) -> Floats:

@@ -230,7 +230,7 @@ def learn_lags(
     footage = Footage.of(tracks, check_lags("start", start, len(tracks)), rates, clocks)
     rig = posed(footage.aligned, rig, synchronous=False)
     with bar(progress, "synchronise", unit="fit") as shown:
-        return replace(_learned(_Videos.of(footage, rig, shown)), clocks=footage.uneven)
+        return replace(_learned(_Videos.of(footage, rig, shown)), clocks=footage.clocks)
 
 
 @dataclass(frozen=True, eq=False)

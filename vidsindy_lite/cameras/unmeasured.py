@@ -268,7 +268,7 @@ def factorised(films: Footage, rig: Rig, synchronous: bool = False) -> Factorise
         )
     if others and rank > 1:  # on a line the motion is the same, whole periods apart
         doubts.append(untold_lags([best, *others]))
-    told = Lags(best, films.rates, errors, left, tuple(doubts), clocks=films.uneven)
+    told = Lags(best, films.rates, errors, left, tuple(doubts), clocks=films.clocks)
     variance = sizes[:rank] ** 2 / (seen * count * max(left, ROUNDING) ** 2)
     return Factorised(Rig(cameras, note=_NOTE), told, variance)
 
