@@ -172,8 +172,6 @@ def drifted(fit: Adjustment) -> Adjustment:
     errors, off = fit.errors.copy(), np.zeros(len(fit.errors))
     errors[1:, DRIFT] = np.inf
     free = adjust(fit.given, fit.start, errors, begin=fit.change)
-    if not in_common(free):
-        return fit
     off[1:] = np.sqrt(np.diag(covariance(free)))[len(off) - 1 :]
     # Standard errors by which a clock must drift, and frames over the whole video.
     clear = np.abs(free.change[:, DRIFT]) > np.maximum(4.0 * off, 0.05)
@@ -474,17 +472,14 @@ def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | No
     """
     start = given.lags
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
-        begun = _near(given, rig)
-        left = min(map(_worst, begun), default=np.inf)
+        left = min(map(_worst, _near(given, rig)), default=np.inf)
         if left <= 2 * DISAGREEMENT:
             return None
-        # Whole views are not mistaken where most frames agree.
-        most = min((fit.left() for fit in begun), default=np.inf) <= 2 * DISAGREEMENT
-        ways = [*_dropped(given, rig, names), *(() if most else _whole(given, rig, names))]
         # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse none.
         ranked = [
-            (*_paired(mended, known.cameras), what, mended, known) for what, mended, known in ways
-        ]
+            (*_paired(mended, known.cameras), what, mended, known)
+            for kind in (_dropped, _whole) for what, mended, known in kind(given, rig, names)
+        ]  # fmt: skip
         # Those that mend most, with all cameras.
         tried = [
             (_worst(fit), fit, what, mended, known)
