@@ -472,14 +472,18 @@ def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | No
     """
     start = given.lags
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
-        left = min(map(_worst, _near(given, rig)), default=np.inf)
+        begun = _near(given, rig)
+        left = min(map(_worst, begun), default=np.inf)
         if left <= 2 * DISAGREEMENT:
             return None
+        # Whole views are not mistaken where most frames agree.
+        most = min((fit.left() for fit in begun), default=np.inf) <= 2 * DISAGREEMENT
         # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse none.
         ranked = [
             (*_paired(mended, known.cameras), what, mended, known)
-            for kind in (_dropped, _whole) for what, mended, known in kind(given, rig, names)
-        ]  # fmt: skip
+            for kind in ((_dropped,) if most else (_dropped, _whole))
+            for what, mended, known in kind(given, rig, names)
+        ]
         # Those that mend most, with all cameras.
         tried = [
             (_worst(fit), fit, what, mended, known)
