@@ -5,6 +5,7 @@ Booleans are no numbers here, and text is none even where numpy would read it as
 
 from __future__ import annotations
 
+import csv
 import os
 import struct
 import zlib
@@ -29,7 +30,7 @@ LARGEST_SIDE = 32768  #: Pixels of a camera's image, in width and in height: no 
 #: What is raised where something from outside is turned into values, and is malformed.
 MALFORMED = (
     ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RuntimeError, ImportError,
-    EOFError, MemoryError, SyntaxError, SystemError, BadZipFile, zlib.error, struct.error,
+    EOFError, MemoryError, SyntaxError, SystemError, BadZipFile, zlib.error, struct.error, csv.Error,
 )  # fmt: skip
 
 

@@ -130,6 +130,11 @@ def test_what_cannot_be_said_is_said_in_a_line(law, start, words):
     assert "\n" not in " ".join(said.notes)
 
 
+def test_a_period_that_may_be_none_by_the_errors_of_the_damping_is_none():
+    said = told(law_of(x={"x": -1.0, "vx": -1.9999999}), [1, 0], errors=0.01)
+    assert said.notes[0] == "no period: by its errors it may as well creep back to rest"
+
+
 def test_bad_input():
     with pytest.raises(ValueError, match="down: must be 2 finite numbers"):
         told(FALL, [0, 1, 4, 5], down=[0, 0, 1])

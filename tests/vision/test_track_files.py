@@ -185,6 +185,7 @@ def test_times_are_kept_and_trackers_world_is_not_taken_for_pixels(tmp_path):
         (TRACKMATE.replace("(pixel)", "(micron)"), "must have positions in pixels, got micron"),
         ("<TrackMate><Model/></TrackMate>", "must be a table, or <Tracks> of TrackMate"),
         ("u,v\n" + "1" * 400 + ",2\n", "must hold numbers of less than 300 digits"),
+        ("u,v\n" + "a" * 200_000 + ",2\n", "field larger than field limit"),
         ("u,v\n1,2\n3,soon\n", "must hold numbers below its header, got 'soon' in row 2"),
         ("t,u,v\n0,1,2\n0,1,2\n", "must have increasing times, got others as t"),
         ("frame,u,v\n1,1,2\n0,1,2\n", "must have increasing whole numbers of frames"),

@@ -246,6 +246,7 @@ class _Body:
         force, stiffness, damping = self.force(law, state)
         return force[0], stiffness[0], damping[0]
 
+    @np.errstate(divide="ignore", invalid="ignore")  # of a swing that hardly is one
     def carried(
         self, rule: Callable[[PolynomialSystem], dict[str, Floats]]
     ) -> dict[str, tuple[Floats, Floats]]:
@@ -377,7 +378,11 @@ class _Body:
                     said[f"period{label}"] = 2 * np.pi / rate.imag
             return said
 
-        yield from (Quantity.of(name, *values) for name, values in self.carried(rule).items())
+        for name, (value, covariance) in self.carried(rule).items():
+            if np.isfinite(covariance).all():
+                yield Quantity.of(name, value, covariance)
+            else:
+                yield f"no {name}: by its errors it may as well creep back to rest"
         powers = self.law.exponents[self.law.support.any(axis=1), : self.m].sum(axis=1)
         if self.law.is_polynomial and powers.max() > 1:
             yield f"of small swings, {IMITATED}: else name that with library="
