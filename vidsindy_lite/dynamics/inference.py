@@ -96,12 +96,11 @@ def infer(
     form, exponents = problem.form, problem.exponents
     coefficients = state.coefficients * units.factors(exponents)
     offset = np.where(state.moving, units.point(state.offset), 0.0)
-    # What the frame of the data needs is decided at the errors at which the terms were chosen.
+    # Errors at which the terms were chosen, over those of the fit.
     tolerated = np.maximum([plateau.low / path.own for plateau in path.of(state.active)], 1.0)
     # To what the shift adds nothing, that the fit has weighed.
     weighed = _shifted(exponents, coefficients, offset)[0] == coefficients.T.ravel()
-    tolerable = np.outer(tolerated**2, problem.penalties).ravel()
-    penalties = np.where(weighed, KEPT, tolerable)
+    penalties = np.where(weighed, KEPT, np.tile(problem.penalties, problem.d))
     noise = problem.noise if problem.has_process_noise else residual_noise(fit)
     span = sum(np.ptp(s.breakpoints) for s in collocation.segments) / len(collocation.grid.x)
 
