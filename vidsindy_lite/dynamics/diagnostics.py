@@ -55,13 +55,9 @@ def shapes(x: Floats, noise: Floats, names: Sequence[str]) -> Iterator[str]:
     names : sequence of str
         Of the coordinates.
     """
-    moves = _moving(x, noise)
-    for j in np.flatnonzero(~moves).tolist():
+    for j in np.flatnonzero(~_moving(x, noise)).tolist():
         yield f"{names[j]} moves by no more than a part of its noise: leave it out"
-    if not moves.any():
-        return
-    x, noise = x[:, moves], noise[moves]
-    where = _round(x, noise, _across(x, noise))
+    where = where_round(x, noise)
     if where is not None:
         round_one, _, _ = str(where).partition("\n")
         free = "angle is" if where.shape == "circle" else "angles are"
@@ -77,21 +73,6 @@ def _moving(x: Floats, noise: Floats) -> Bools:
     return np.array([_distance(centred[:, [j]], e)[1] / e > 0.5 for j, e in enumerate(noise)])
 
 
-def is_on_circle(x: Floats, noise: Floats, places: bool, fewest: int = 5) -> bool:
-    """Whether positions, (n, d), are bound to a circle, if their errors, (d,), are so large.
-
-    The fewest are always on one, or nearly. Two coordinates may not be ``places``.
-    """
-    if x.shape[1] not in (2, 3) or len(x) <= fewest:
-        return False
-    moves = _moving(x, noise)
-    if moves.sum() < 2:
-        return False
-    x, noise = x[:, moves], noise[moves]
-    where = _round(x, noise, _across(x, noise), places)
-    return where is not None and where.shape == "circle"
-
-
 def _across(x: Floats, noise: Floats) -> int:
     """Across how many directions a motion is flat."""
     d, scale = x.shape[1], x.std(axis=0)
@@ -104,16 +85,18 @@ def _across(x: Floats, noise: Floats) -> int:
     return wide.index(False) if False in wide else d - 1
 
 
-def _round(x: Floats, noise: Floats, flat: int, places: bool = False) -> Round | None:
-    """The circle or sphere of a motion that is flat across so many directions, if it is on one.
+def where_round(x: Floats, noise: Floats, places: bool = False) -> Round | None:
+    """The circle or sphere of what moves of a motion, (n, d), if it is on one.
 
     Of two coordinates that go round, one may be the speed of the other, or hunt it: only what turns
     back on its arc, as nothing does that is not bound to it, is a bob; it may be ten times as far
     off. Of what are ``places`` for sure, as in space, half a turn is enough.
     """
-    d = x.shape[1]
+    moves = _moving(x, noise)
+    x, noise, d = x[:, moves], noise[moves], int(moves.sum())
+    flat = _across(x, noise) if d in (2, 3) else d
     planar = d - flat == 2
-    if not (planar and d <= 3 or d == 3 and not flat):
+    if not planar and (flat or d != 3):
         return None
     try:
         where = on_circle(x) if planar else on_sphere(x)
@@ -206,53 +189,6 @@ def more_than_chance(gain: float, count: int) -> bool:
 
 
 @dataclass(frozen=True)
-class Beyond:
-    """What terms of higher degree would explain, and the best of those that a law has not.
-
-    Parameters
-    ----------
-    gain : float
-        What all of them lower the objective by, in chi-square units.
-    count : int
-        How many there are.
-    best : float
-        What the best term does that the law has not, one of theirs or of the library.
-    tried : int
-        How many these are.
-    left : float
-        The objective, of which they explain a part.
-    term : str
-        The best of them, and its equation.
-    """
-
-    gain: float
-    count: int
-    best: float
-    tried: int
-    left: float
-    term: str
-
-    @property
-    def significant(self) -> bool:
-        """Whether that is more than chance makes."""
-        several = more_than_chance(self.gain, self.count)
-        return bool(several or self.count and chdtrc(1, self.best) * self.tried < 1e-3)
-
-    @property
-    def decisive(self) -> bool:
-        """Whether one term, or few, explain nearly all that is left, be that noise or not.
-
-        Errors that last, of an integrator or a lens, are spread over several (up to two thirds in
-        one were seen). Few have four times as many errors left as they are; and of as many
-        independent errors as are left, one direction seldom has such a share.
-        """
-        share, others = min(self.best / self.left, 1.0), max(self.left - 1, 0.0) / 2
-        alone = others and betaincc(0.5, others, share) * self.tried < 1e-3
-        most, few = 0.9 * self.left, self.count and 4 * self.count < self.left
-        return bool(alone and self.best > most or few and self.gain > most)
-
-
-@dataclass(frozen=True)
 class Wider:
     """A fit among the candidates of a library and the terms of the next degrees.
 
@@ -276,22 +212,49 @@ class Wider:
         return self.problem.model(self.fit)
 
     @cached_property
-    def beyond(self) -> Beyond:
-        """The score test of the terms that the law has not."""
-        own = np.flatnonzero(self.fit.state.free())
-        others = np.setdiff1d(self.problem.form.searched, own)
-        model = self.model.of(np.append(own, others))
-        estimate, variance = newcomers(model.information, model.gradient, len(own))
-        single = estimate**2 / variance
-        model, law = self.model.of(np.append(own, self.further)), self.problem.law(self.fit.state)
-        return Beyond(
-            gain=float(model.newton()[1] - model.fall),
-            count=len(self.further),
-            best=float(single.max(initial=0.0)),
-            tried=len(others),
-            left=float(self.fit.collocation.objective(self.fit.state)),
-            term=place(law, int(others[single.argmax()])) if len(others) else "",
-        )
+    def own(self) -> Ints:
+        """What the law has."""
+        return np.flatnonzero(self.fit.state.free())
+
+    @cached_property
+    def others(self) -> Ints:
+        """What it has not: further terms, and those of the library."""
+        return np.setdiff1d(self.problem.form.searched, self.own)
+
+    @cached_property
+    def gain(self) -> float:
+        """What all further terms lower the objective by, in chi-square units."""
+        model = self.model.of(np.append(self.own, self.further))
+        return float(model.newton()[1] - model.fall)
+
+    @cached_property
+    def single(self) -> Floats:
+        """What each of the others does by itself."""
+        model = self.model.of(np.append(self.own, self.others))
+        estimate, variance = newcomers(model.information, model.gradient, len(self.own))
+        return estimate**2 / variance
+
+    @property
+    def significant(self) -> bool:
+        """Whether that is more than chance makes."""
+        several, count = more_than_chance(self.gain, len(self.further)), len(self.others)
+        best = self.single.max(initial=0.0)
+        return bool(several or self.further.size and chdtrc(1, best) * count < 1e-3)
+
+    @property
+    def decisive(self) -> bool:
+        """Whether one term, or few, explain nearly all that is left, be that noise or not.
+
+        Errors that last, of an integrator or a lens, are spread over several (up to two thirds in
+        one were seen). Few have four times as many errors left as they are; and of as many
+        independent errors as are left, one direction seldom has such a share.
+        """
+        left = float(self.fit.collocation.objective(self.fit.state))
+        best, count = self.single.max(initial=0.0), len(self.further)
+        share, independent = min(best / left, 1.0), max(left - 1, 0.0) / 2
+        alone = independent and betaincc(0.5, independent, share) * len(self.others) < 1e-3
+        few = count and 4 * count < left
+        return bool(alone and best > 0.9 * left or few and self.gain > 0.9 * left)
 
 
 def widened(problem: Problem, fit: Fit, budget: float = 5e6) -> Wider:
@@ -593,7 +556,7 @@ def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:
     ratio = np.where(seen, residual / problem.noise, 0.0)
     misses = ~(ratio < CONSISTENT)
     # A curve without a law follows errors that last, too: they are no misfit.
-    if misses.any() and wider.beyond.count and not wider.beyond.significant:
+    if misses.any() and wider.further.size and not wider.significant:
         misses &= ~passing(fit, len(wider.problem.exponents))
     if misses.any():
         j = int(np.where(misses, ratio, 0.0).argmax())
@@ -679,15 +642,16 @@ def _rivals(
     yield from _changing(problem, fit, min(path.tolerated, max(TOLERATED / path.own, 1.0)))
     begins = max(plateau.low for plateau in path.of(fit.state.active))
     tolerant = clean or begins > path.lowest
-    found = wider.beyond
     # Errors that last may follow the state, too; they are no reason to doubt, unless a single term,
     # or the few that a single coordinate has, explain nearly all of them.
-    if found.decisive or (found.significant and not tolerant):
+    if wider.decisive or (wider.significant and not tolerant):
+        single = wider.single
+        term = place(wider.problem.law(wider.fit.state), wider.others[single.argmax()])
         yield (
-            f"terms that the law has not explain what it leaves ({found.term}: chi-square "
-            f"{found.best:.4g}, all {found.count} of higher degree together {found.gain:.4g}): it "
-            "may be an approximation along these data, as of a sine or a drag; raise the degree, "
-            "or name its terms with library="
+            f"terms that the law has not explain what it leaves ({term}: chi-square "
+            f"{single.max():.4g}, all {len(wider.further)} of higher degree together "
+            f"{wider.gain:.4g}): it may be an approximation along these data, as of a sine or a "
+            "drag; raise the degree, or name its terms with library="
         )
     # From where the law begins to what is tolerated, each decade as likely.
     least = max(begins / path.own, 1.0)

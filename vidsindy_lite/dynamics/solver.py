@@ -26,7 +26,7 @@ from ..progress import bar
 from .bspline import DEGREE
 from .collocation import Fit, Status
 from .data import Trajectory, check_sigma, check_systematic, check_trajectories, coordinate_names
-from .diagnostics import CLOSE, diagnose, is_on_circle
+from .diagnostics import CLOSE, diagnose, where_round
 from .inference import infer, with_errors
 from .l0 import STRONG
 from .library import Library, check_library, monomial_exponents, monomials
@@ -260,7 +260,10 @@ def _swing(task: _Task, problem: Problem, places: bool) -> Swing | None:
     x = np.concatenate([values for _, values in trajectories])
     noise = (problem.noise * problem.units.scale)[: x.shape[1]]
     seen = x[np.isfinite(x).all(axis=1)]
-    if problem.form.functions or not is_on_circle(seen, noise, places):
+    if problem.form.functions or not len(seen):
+        return None
+    where = where_round(seen, noise, places)
+    if where is None or where.shape != "circle":
         return None
 
     form = Form.of((NAME,), LIBRARY, 2)
