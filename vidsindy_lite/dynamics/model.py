@@ -93,29 +93,17 @@ def runge_kutta_4(
     return np.array(states)
 
 
-def one_by_one(exponents: Ints, coefficients: Floats) -> Callable[[Sequence[float]], list[float]]:
-    """Sums of monomials at a point, (d,), as a function of its coordinates.
+def sums(exponents: Ints, coefficients: Floats) -> Callable[[Floats], Floats]:
+    """Sums of monomials at a point, (d,), as a function of its coordinates; no BLAS adds them."""
+    used = coefficients.any(axis=1)
+    exponents, coefficients = exponents[used], coefficients[used]
+    highest, width = exponents.max(initial=0), exponents.shape[1]
+    powers, columns = np.ones((highest + 1, width)), np.arange(width)
 
-    No digit is left to a BLAS; and for the few numbers of a law it is faster than arrays.
-    """
-    terms = [
-        ([(i, e) for i, e in enumerate(powers) if e], [(j, c) for j, c in enumerate(parts) if c])
-        for powers, parts in zip(exponents.tolist(), coefficients.tolist(), strict=True)
-        if any(parts)
-    ]
-
-    def value(z: Sequence[float]) -> list[float]:
-        sums = [0.0] * coefficients.shape[1]
-        for powers, parts in terms:
-            product = 1.0
-            for i, exponent in powers:
-                power = z[i]
-                for _ in range(exponent - 1):
-                    power *= z[i]
-                product *= power
-            for j, coefficient in parts:
-                sums[j] += product * coefficient
-        return sums
+    def value(z: Floats) -> Floats:
+        powers[1:] = z
+        factors = np.multiply.accumulate(powers)[exponents, columns]
+        return np.add.reduce(np.multiply.reduce(factors, axis=1)[:, None] * coefficients)
 
     return value
 
@@ -531,17 +519,16 @@ class PolynomialSystem:
         every = np.unique(np.concatenate([since, *at, *(np.maximum(one - just, 0) for one in at)]))
         fraction, size = bool(self.implicit.any()), self.d + len(self.functions)
         above, below = (
-            one_by_one(self.exponents[rows, :size], self.coefficients[rows])
+            sums(self.exponents[rows, :size], self.coefficients[rows])
             for rows in (~self.implicit, self.implicit)
         )
 
         def rate(x: Floats) -> Floats:
-            x = x + clock
-            z = (extended(x[None], self.functions)[0] if self.functions else x).tolist()
+            z = extended((x + clock)[None], self.functions)[0]
             if not fraction:
-                return np.array(above(z))
+                return above(z)
             with np.errstate(divide="ignore", invalid="ignore"):  # at a pole the path ends
-                return np.array(above(z)) / (1 - np.array(below(z)))
+                return above(z) / (1 - below(z))
 
         farthest = 1e8 * (1 + np.abs(x0).max())
         path, end = integrate(rate, every, x0, farthest)
