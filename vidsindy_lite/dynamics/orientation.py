@@ -9,7 +9,7 @@ does for shifts.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import comb
 from operator import itemgetter
 
@@ -34,70 +34,59 @@ Solved = tuple[Discovery, Problem, Fit]
 Measured = tuple[list[Trajectory], list[Floats], list[Floats] | None]
 
 
-@dataclass(frozen=True, eq=False)
-class TurnedLaw:
-    """An estimate of all terms of a law of m coordinates, to be looked at in other axes.
+def estimated(problem: Problem, fit: Fit) -> tuple[Ints, Floats]:
+    """An estimate of all terms of some rows of the library, to be looked at in other axes.
 
-    Parameters
-    ----------
+    By the quadratic model around a fit of m coordinates.
+
+    Returns
+    -------
     exponents : ndarray of int, shape (l, m) or (l, 2 m)
-        All monomials up to a degree, of places, or of places and velocities.
+        Of places, or of places and velocities.
     estimates : ndarray, shape (1 + k, l, m)
-        Coefficients in axes of one unit, and the directions in which they are uncertain, each one
-        standard error long.
+        Coefficients in axes of one unit, and the 40 largest directions in which they are uncertain,
+        each one standard error long.
     """
+    rows, columns = fit.state.active.any(axis=1), np.flatnonzero(fit.state.free())
+    model, m = fit.collocation.linearise(fit.state, columns), _places(problem)
+    factors = _in_one_unit(problem)[rows, -m:].T.ravel()
+    flat = factors * (fit.state.flat()[columns] + model.newton()[0])
+    values, axes = np.linalg.eigh(factors[:, None] * inverse(model.information) * factors)
+    directions = (axes * np.sqrt(np.maximum(values, 0.0))).T[::-1]
+    stacked = np.vstack([flat, directions[:40]]).reshape(-1, m, rows.sum())
+    return problem.exponents[rows], np.moveaxis(stacked, 1, 2)
 
-    exponents: Ints
-    estimates: Floats
 
-    @classmethod
-    def of(cls, problem: Problem, fit: Fit) -> TurnedLaw:
-        """The quadratic model around a fit of all terms of some rows of the library."""
-        rows, columns = fit.state.active.any(axis=1), np.flatnonzero(fit.state.free())
-        model, m = fit.collocation.linearise(fit.state, columns), _places(problem)
-        factors = _in_one_unit(problem)[rows, -m:].T.ravel()
-        flat = factors * (fit.state.flat()[columns] + model.newton()[0])
-        values, axes = np.linalg.eigh(factors[:, None] * inverse(model.information) * factors)
-        directions = (axes * np.sqrt(np.maximum(values, 0.0))).T[::-1]
-        stacked = np.vstack([flat, directions]).reshape(-1, m, rows.sum())
-        return cls(problem.exponents[rows], np.moveaxis(stacked, 1, 2))
+def descended(
+    law: tuple[Ints, Floats], turn: Floats, origin: Floats, size: float
+) -> tuple[float, Floats, Floats]:
+    """The nearest orientation, (m, m), and origin, (m,), with fewest terms, and their number.
 
-    def seen(self, turn: Floats, origin: Floats) -> tuple[Floats, Floats]:
-        """Coefficients and their variances, (l, m), in axes that are the rows of ``turn``, (m, m).
+    Axes are the rows of an orientation. A coefficient counts ``log(1 + z^2)``, with ``z`` over its
+    standard error and a size.
+    """
+    (exponents, estimates), m = law, len(turn)
 
-        Around an origin, (m,), in the axes of the estimate.
-        """
-        m = len(turn)
-        copies = self.exponents.shape[1] // m
-        whole = np.append(origin, np.zeros(self.exponents.shape[1] - m))  # velocities have none
-        inward = block_diag(*[turn.T] * copies)
-        law, *spread = _mapped(self.exponents, self.estimates, inward, whole, turn)
-        return law, (np.array(spread) ** 2).sum(axis=0)
+    def moved(step: Floats) -> tuple[Floats, Floats]:
+        return turned(step[:-m], m) @ turn, origin + step[-m:]
 
-    def descended(self, turn: Floats, origin: Floats, size: float) -> tuple[float, Floats, Floats]:
-        """The nearest orientation and origin with fewest terms, and their smoothed number.
+    def scores(step: Floats) -> Floats:
+        axes, place = moved(step)
+        whole = np.append(place, np.zeros(exponents.shape[1] - m))  # velocities have none
+        inward = block_diag(*[axes.T] * (exponents.shape[1] // m))
+        estimate, *spread = _mapped(exponents, estimates, inward, whole, axes)
+        return (estimate / np.sqrt(np.square(spread).sum(axis=0) + size**2)).ravel()
 
-        A coefficient counts ``log(1 + z^2)``, with ``z`` over its standard error and a size.
-        """
-        m = len(turn)
-
-        def moved(step: Floats) -> tuple[Floats, Floats]:
-            return turned(step[:-m], m) @ turn, origin + step[-m:]
-
-        def scores(step: Floats) -> Floats:
-            estimate, variance = self.seen(*moved(step))
-            return (estimate / np.sqrt(variance + size**2)).ravel()
-
-        start = np.zeros(m * (m - 1) // 2 + m)
-        best = least_squares(scores, start, max_nfev=60, loss="cauchy")
-        return float(best.cost), *moved(best.x)
+    start = np.zeros(m * (m - 1) // 2 + m)
+    best = least_squares(scores, start, max_nfev=60, loss="cauchy")
+    return float(best.cost), *moved(best.x)
 
 
 def rough_orientations(problem: Problem, rng: np.random.Generator, most: int = 3) -> list[Floats]:
     """Orientations in which fits of all terms up to a degree look sparse, for degrees as needed.
 
     Of each degree at most so many, sought from those of lower degrees, from the data's own, and
-    from 20 random ones; by the 40 largest directions of uncertainty.
+    from 20 random ones.
     """
     degrees, m = problem.exponents.sum(axis=1), _places(problem)
     found: list[Floats] = []
@@ -105,15 +94,14 @@ def rough_orientations(problem: Problem, rng: np.random.Generator, most: int = 3
         fit = unpruned(problem, degrees <= degree)
         if fit.status is not Status.CONVERGED:  # too many terms for these data
             continue
-        law = TurnedLaw.of(problem, fit)
-        law = replace(law, estimates=law.estimates[:41])
+        law = estimated(problem, fit)
         turns, _ = np.linalg.qr(rng.standard_normal((20, m, m)))
         turns[:, 0] *= np.linalg.det(turns)[:, None]  # not mirrored
         starts = [*found, np.eye(m), *turns]
         # A coefficient counts from a tenth of its standard size on, at the end from a hundredth.
-        coarse = [law.descended(turn, np.zeros(m), 0.1) for turn in starts]
+        coarse = [descended(law, turn, np.zeros(m), 0.1) for turn in starts]
         coarse.sort(key=itemgetter(0))
-        fine = [law.descended(turn, origin, 0.01) for _, turn, origin in coarse[: 2 * most]]
+        fine = [descended(law, turn, origin, 0.01) for _, turn, origin in coarse[: 2 * most]]
         limit = len(found) + most
         for _, turn, _ in sorted(fine, key=itemgetter(0)):
             near = nearest(turn)
