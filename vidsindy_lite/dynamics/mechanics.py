@@ -554,7 +554,7 @@ def on_circle(
     >>> swing = vl.on_circle(seen.x, zero=(0, 0, -1), systematic=seen.systematic)
     >>> print(swing.radius, swing.radius_error)
     """
-    return _with_shared(_checked(x, (2, 3)), zero, systematic, False)
+    return _with_shared(x, zero, systematic, False)
 
 
 def on_sphere(
@@ -583,25 +583,21 @@ def on_sphere(
     ValueError
         If ``x`` or ``systematic`` has another shape or too few rows, or lies in a plane.
     """
-    return _with_shared(_checked(x, (3,)), zero, systematic, True)
-
-
-def _checked(positions: ArrayLike, dimensions: tuple[int, ...]) -> Floats:
-    x = check_array("x", positions)
-    if x.ndim != 2 or x.shape[1] not in dimensions:
-        wanted = " or ".join(f"(n, {d})" for d in dimensions)
-        raise ValueError(f"x: must have shape {wanted}, got {x.shape}")
-    seen, fewest = np.isfinite(x).all(axis=1).sum(), x.shape[1] + 3
-    if seen < fewest:
-        raise ValueError(f"x: must hold at least {fewest} positions, got {seen}")
-    return x
+    return _with_shared(x, zero, systematic, True)
 
 
 def _with_shared(
-    x: Floats, zero: ArrayLike | None, systematic: ArrayLike | None, sphere: bool
+    positions: ArrayLike, zero: ArrayLike | None, systematic: ArrayLike | None, sphere: bool
 ) -> Round:
     """What is fitted to positions, and what each error that they share makes of it."""
-    found, (n, d), seen = _round(x, zero, sphere), x.shape, np.isfinite(x).all(axis=1)
+    x = check_array("x", positions)
+    if x.ndim != 2 or x.shape[1] not in (3, 3 if sphere else 2):
+        wanted = "(n, 3)" if sphere else "(n, 2) or (n, 3)"
+        raise ValueError(f"x: must have shape {wanted}, got {x.shape}")
+    (n, d), seen = x.shape, np.isfinite(x).all(axis=1)
+    if seen.sum() < d + 3:
+        raise ValueError(f"x: must hold at least {d + 3} positions, got {seen.sum()}")
+    found = _round(x, zero, sphere)
     if systematic is None:
         return found
     errors = check_array("systematic", systematic)
