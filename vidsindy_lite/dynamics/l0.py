@@ -138,18 +138,6 @@ class _Fit:
         """What each newcomer explains."""
         return _gain(self.left[self.outside], self.room)
 
-    @cached_property
-    def gained_after(self) -> Floats:
-        """What it explains after each drop, (outside, inside).
-
-        A drop changes what the others leave over, and the room a newcomer has, by rank one.
-        """
-        left = self.response * (self.fitted / self.spread)
-        left += self.left[self.outside, None]
-        room = self.response**2 / self.spread
-        room += self.room[:, None]
-        return _gain(left, room)
-
 
 @dataclass(frozen=True)
 class _Quadratic:
@@ -239,7 +227,9 @@ def _best_change(model: _Quadratic, fit: _Fit) -> tuple[float, list[int]]:
     changes[0, 1:] = loss
     changes[1:, 0] = price - fit.gained
     changes[1:, 1:] = loss + price[:, None]
-    changes[1:, 1:] -= fit.gained_after
+    # A drop changes what the others leave over, and the room a newcomer has, by rank one.
+    left = fit.response * (fit.fitted / fit.spread) + fit.left[fit.outside, None]
+    changes[1:, 1:] -= _gain(left, fit.response**2 / fit.spread + fit.room[:, None])
     add, drop = divmod(int(np.nanargmin(changes)), 1 + len(loss))
     entries = [*fit.inside[drop - 1 : drop].tolist(), *fit.outside[add - 1 : add].tolist()]
     return float(changes[add, drop]), entries
