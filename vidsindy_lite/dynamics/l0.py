@@ -7,7 +7,6 @@ matrix: all matrices are scaled to a unit diagonal before they are solved or inv
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from operator import itemgetter
 
 import numpy as np
@@ -101,11 +100,9 @@ def minimiser(information: Floats, gradient: Floats, present: Floats, support: B
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """A quadratic function at its minimum on a support, and what single changes of it hang on.
+    """A quadratic function at its minimum on a support, and the gradient that is left there.
 
-    All in scaled entries: ``left`` is the gradient that is left, ``response`` (outside, inside) how
-    far those inside give way to a newcomer, ``room`` the share of it that is no combination of
-    those inside.
+    All in scaled entries.
     """
 
     matrix: Floats
@@ -116,27 +113,15 @@ class _Fit:
     left: Floats
     fall: float
 
-    @cached_property
-    def outside(self) -> Ints:
-        return np.flatnonzero(~self.support)
+    def newcomers(self) -> tuple[Ints, Floats, Floats]:
+        """Those outside, (k,), how far those inside give way to each, (k, inside), and its room.
 
-    @cached_property
-    def spread(self) -> Floats:
-        return self.inverse.diagonal()
-
-    @cached_property
-    def response(self) -> Floats:
-        return self.matrix[self.outside[:, None], self.inside] @ self.inverse
-
-    @cached_property
-    def room(self) -> Floats:
-        shared = self.matrix[self.outside[:, None], self.inside]
-        return 1 - (self.response * shared).sum(axis=1)
-
-    @cached_property
-    def gained(self) -> Floats:
-        """What each newcomer explains."""
-        return _gain(self.left[self.outside], self.room)
+        That is the share of it that is no combination of those inside, (k,).
+        """
+        outside = np.flatnonzero(~self.support)
+        shared = self.matrix[outside[:, None], self.inside]
+        response = shared @ self.inverse
+        return outside, response, 1 - (response * shared).sum(axis=1)
 
 
 @dataclass(frozen=True)
@@ -220,18 +205,19 @@ def _changed(support: Bools, entries: list[int]) -> Bools:
 
 def _best_change(model: _Quadratic, fit: _Fit) -> tuple[float, list[int]]:
     """The best of all drops, adds and swaps: change of the function, and whose places change."""
-    loss = fit.fitted**2 / fit.spread - model.penalty[fit.inside]
-    price = model.penalty[fit.outside]
+    (outside, response, room), spread = fit.newcomers(), fit.inverse.diagonal()
+    loss = fit.fitted**2 / spread - model.penalty[fit.inside]
+    price = model.penalty[outside]
     # A row for each that joins, the first for none; a column for each that leaves, the same.
     changes = np.full((1 + len(price), 1 + len(loss)), np.inf)
     changes[0, 1:] = loss
-    changes[1:, 0] = price - fit.gained
+    changes[1:, 0] = price - _gain(fit.left[outside], room)
     changes[1:, 1:] = loss + price[:, None]
     # A drop changes what the others leave over, and the room a newcomer has, by rank one.
-    left = fit.response * (fit.fitted / fit.spread) + fit.left[fit.outside, None]
-    changes[1:, 1:] -= _gain(left, fit.response**2 / fit.spread + fit.room[:, None])
+    left = response * (fit.fitted / spread) + fit.left[outside, None]
+    changes[1:, 1:] -= _gain(left, response**2 / spread + room[:, None])
     add, drop = divmod(int(np.nanargmin(changes)), 1 + len(loss))
-    entries = [*fit.inside[drop - 1 : drop].tolist(), *fit.outside[add - 1 : add].tolist()]
+    entries = [*fit.inside[drop - 1 : drop].tolist(), *outside[add - 1 : add].tolist()]
     return float(changes[add, drop]), entries
 
 
@@ -339,18 +325,19 @@ def far_neighbours(
     law, found, price = model.fit(support), [], penalty - 2 * np.log(model.scale)
     for dropped in (-1, *law.inside.tolist()):
         fit = model.fit(support & (np.arange(len(support)) != dropped))
-        outside, room = fit.outside, fit.room
+        outside, response, room = fit.newcomers()
         new = (room > COLLINEAR) & (outside != dropped)  # to add what was dropped is the law itself
         own = fit.fall - np.linalg.slogdet(fit.inverse)[1] + price[fit.inside].sum()
-        joined = np.where(new, own + np.log(room) - fit.gained + price[outside], np.inf)
+        gained = _gain(fit.left[outside], room)
+        joined = np.where(new, own + np.log(room) - gained + price[outside], np.inf)
         step = np.where(new, fit.left[outside] / room, 0.0)
         values = np.zeros((1 + len(outside), len(law.inside)))
         values[:, law.inside != dropped] = fit.fitted
-        values[1:, law.inside != dropped] -= step[:, None] * fit.response
+        values[1:, law.inside != dropped] -= step[:, None] * response
         out = np.full(len(values), dropped)
         found.append((np.append(own, joined), values, out, np.append(-1, outside)))
     cost, values, out, into = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    apart = np.abs(values - law.fitted) / np.sqrt(law.spread)
+    apart = np.abs(values - law.fitted) / np.sqrt(law.inverse.diagonal())
     weight = np.exp((cost.min() - cost) / 2)
     weight = np.where((apart > 4).any(axis=1), weight / weight.sum(), 0.0)
     best = int(weight.argmax())
