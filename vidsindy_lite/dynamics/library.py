@@ -631,7 +631,12 @@ class Library:
         """
         d = len(names)
         states = d - (CLOCK in names[measured:])
-        self._check_size(states, measured)
+        highest = max(self.degree or 0, self.denominators)
+        count = comb(states + highest, states) + 2 * self.harmonics * measured
+        if count > 1000:  # than a search can try to an end
+            raise ValueError(
+                f"library: must have at most 1000 terms, got {count} in {states} variables"
+            )
         functions = [
             harmonic(names, axis, multiple, kind)
             for axis in range(measured)
@@ -659,19 +664,6 @@ class Library:
                 rows[:, :states], rows[:, slope - d] = below, 1
                 exponents = np.concatenate([exponents, rows])
         return exponents, tuple(functions)
-
-    def _check_size(self, states: int, measured: int, most: int = 1000) -> None:
-        """Refuse more terms than a search can try to an end, before they are listed."""
-        degree, waves = max(self.degree or 0, self.denominators), 2 * self.harmonics * measured
-        count, what, which = max(
-            (comb(states + degree, states), "monomials", f"of degree {degree}"),
-            (waves, "sines and cosines", f"of {self.harmonics} multiples"),
-        )
-        if count > most:
-            raise ValueError(
-                f"library: must have at most {most} {what}, got {count} {which} in {states} "
-                "variables"
-            )
 
 
 def check_library(degree: int | None, library: Library | None) -> Library:
