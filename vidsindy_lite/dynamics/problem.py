@@ -422,12 +422,9 @@ def with_unseen(
         x[:, measured] = units.point(curve(t))
         slopes[:, seen] = curve(t, 1) * units.scale / units.time
         for u, (j, term) in zip(hidden, telling, strict=True):
-            rest = form.known[:, j].copy()
-            rest[term] = 0.0
-            known = monomials(x[:, :m], form.exponents[:, :m]) @ rest
+            known = monomials(x[:, :m], form.exponents[:, :m]) @ form.known[:, j]  # u is still 0
             x[:, u] = (slopes[:, j] - known) / form.known[term, j]
-        if moves:
-            x[:, m : 2 * m] = slopes
+        x[:, m : form.states] = slopes[:, : form.states - m]
         if timed:
             x[:, -1] = t * units.time
         return x
