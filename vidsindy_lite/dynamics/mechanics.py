@@ -148,28 +148,22 @@ def physics_of(
             driven = "a force changes with the time: what is said holds without it; no energy"
     times = [np.linspace(curve.t[0], curve.t[-1], POINTS) for curve in curves]
     paths = [curve(t)[:, : law.d] for curve, t in zip(curves, times, strict=True)]
-    body = _Body(law, covariance, np.concatenate(paths))
-    rest = None
+    body = _Body(law, covariance, times, paths)
     if not body.force(law, body.states)[1].any():
         said = list(body.flight(down))
-    elif (rest := body.rest()) is not None:
-        said = list(body.swing(rest))
+    elif body.rest is not None:
+        said = list(body.swing(body.rest))
     else:
         said = [
             "nothing holds it at a place near the motion, or a force jumps there: no spring "
             "constants and no periods"
         ]
-    energy = [] if driven else body.energies(law, times, paths, rest)
-    change = "the forces have no potential: no energy"
-    if energy:
-        change = body.balance(times, paths, rest)
+    energy = [] if driven else body.energies(law)
+    change = body.balance() if energy else "the forces have no potential: no energy"
     return Physics(
         quantities=tuple(entry for entry in said if isinstance(entry, Quantity)),
         energy=tuple(energy),
-        notes=(
-            *(entry for entry in said if isinstance(entry, str)),
-            driven or change,
-        ),
+        notes=(*(entry for entry in said if isinstance(entry, str)), driven or change),
     )
 
 
@@ -195,13 +189,21 @@ class _Body:
     ----------
     law : PolynomialSystem
     covariance : ndarray, shape (l d, l d)
-    states : ndarray, shape (n, 2 m)
-        Places and velocities that were seen.
+    times : list of ndarray, shape (n,)
+        Of each curve that was seen.
+    paths : list of ndarray, shape (n, 2 m)
+        Places and velocities there.
     """
 
     law: PolynomialSystem
     covariance: Floats
-    states: Floats
+    times: list[Floats]
+    paths: list[Floats]
+
+    @cached_property
+    def states(self) -> Floats:
+        """All places and velocities that were seen, (n, 2 m)."""
+        return np.concatenate(self.paths)
 
     @property
     def m(self) -> int:
@@ -323,6 +325,7 @@ class _Body:
                 break
         return np.where(np.abs(place) < nothing, 0.0, place)
 
+    @cached_property
     def rest(self) -> Floats | None:
         """Where forces pull the body back to, no farther off than half of its range; else none.
 
@@ -390,12 +393,12 @@ class _Body:
             why = "what is near rest leaves it" if leaves[j] else "it creeps back to rest"
             yield f"no period{labels[j]}: {'nothing pulls it back' if free[j] else why}"
 
-    def balance(self, times: Sequence[Floats], paths: Sequence[Floats], rest: Floats | None) -> str:
+    def balance(self) -> str:
         """How the energy changes along paths, by more than its errors and a share that is none."""
-        most = max(float((path[:, self.m :] ** 2).sum(axis=1).max()) for path in paths) / 2
+        most = float((self.states[:, self.m :] ** 2).sum(axis=1).max()) / 2
 
         def changes(law: PolynomialSystem) -> dict[str, Floats]:
-            levels = [pair[:, 1] / most for pair in self.energies(law, times, paths, rest)]
+            levels = [pair[:, 1] / most for pair in self.energies(law)]
             rises = [(level - np.minimum.accumulate(level)).max() for level in levels]
             falls = [level[0] - level[-1] for level in levels]
             return {"rise": np.max(rises, initial=0.0), "fall": np.max(falls, initial=0.0)}
@@ -410,10 +413,7 @@ class _Body:
             return f"the energy falls by {100 * fall:.3g} % {share}, and never rises"
         return f"the energy is kept, to {100 * kept:.2g} % {share}"
 
-    def energies(
-        self, law: PolynomialSystem, times: Sequence[Floats], paths: Sequence[Floats],
-        rest: Floats | None,
-    ) -> list[Floats]:  # fmt: skip
+    def energies(self, law: PolynomialSystem) -> list[Floats]:
         """Times and energies along paths; none if the forces at rest have no potential.
 
         Their curl is then a twentieth of their gradients, which errors of coefficients do not make.
@@ -427,13 +427,13 @@ class _Body:
         if (twist**2).mean() > 0.05**2 * (slopes**2).mean():
             return []
         found = []
-        for t, path in zip(times, paths, strict=True):
+        for t, path in zip(self.times, self.paths, strict=True):
             places, velocity = path[:, : self.m], path[:, self.m :]
             power = (still(places)[0] * velocity).sum(axis=1)
             stored = -cumulative_simpson(power, x=t, initial=0.0)
-            if rest is not None:
-                away, share = places[0] - rest, np.linspace(0, 1, POINTS)
-                pull = still(rest + share[:, None] * away)[0] @ away
+            if self.rest is not None:
+                away, share = places[0] - self.rest, np.linspace(0, 1, POINTS)
+                pull = still(self.rest + share[:, None] * away)[0] @ away
                 stored -= cumulative_simpson(pull, x=share)[-1]
             found.append(np.stack([t, stored + (velocity**2).sum(axis=1) / 2], axis=1))
         return found
