@@ -203,10 +203,8 @@ def smoother_weights(problem: Problem) -> Problem:
     """
     if problem.measured_errors:
         return problem
-    step, curves = 1e-3, list(zip(problem.curves, problem.stretches, strict=True))
-    behind, signal, ahead = (
-        np.concatenate([curve(t + by) for curve, (_, (t, _)) in curves]) for by in (-step, 0, step)
-    )
+    step = 1e-3
+    behind, signal, ahead = (problem.smoothed(by) for by in (-step, 0, step))
     x = np.concatenate([values for _, (_, values) in problem.stretches])
     residual, observed = np.nan_to_num(signal - x), np.isfinite(x)
     # What the variance of the noise may follow: place and speed.
@@ -220,11 +218,7 @@ def smoother_weights(problem: Problem) -> Problem:
         noise[j] *= np.sqrt(left) / spread[j]
     if (factors == 1).all():
         return problem
-    precision = [values.copy() for values in problem.precision]
-    ends = np.cumsum([len(t) for _, (t, _) in problem.stretches])[:-1]
-    for (number, (t, _)), factor in zip(problem.stretches, np.split(factors, ends), strict=True):
-        rows = np.searchsorted(problem.trajectories[number][0], t)
-        precision[number][rows] *= factor
+    precision = problem.precision * factors
     return replace(problem, precision=precision, noise=np.maximum(noise, CLEANEST))
 
 
@@ -465,7 +459,8 @@ def views(pose: Callable[..., Problem]) -> list[Problem]:
     whole = pose()
     problem = smoother_weights(whole)
     # What no smooth curve explains may still be the law's: a transient that a sample or two show.
-    found = [problem] if (problem.counts == whole.counts).all() else [problem, whole]
+    drops = ((problem.precision == 0) & (whole.precision > 0)).any()
+    found = [problem, whole] if drops else [problem]
     # A curve that has given the motion up, and leaves nearly all of its spread, has no turns.
     enough = problem.samples_a_turn > COARSE and problem.noise.max() < 0.9
     if not (enough or problem.measured_errors or (problem.noise <= TOLERATED).all()):

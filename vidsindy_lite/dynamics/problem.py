@@ -44,19 +44,17 @@ class Problem:
         The data in the user's units.
     trajectories : list of Trajectory
         The same in standard units.
-    systematic : list of ndarray, shape (n, d, k)
-        Errors that all samples share, for each trajectory, without what grows with the place.
-    pulls : ndarray, shape (d, d, k)
-        By how much they grow with it.
-    smoothed : list of ndarray, shape (n, d)
-        Each trajectory without its noise, as its curves have it.
-    precision : list of ndarray, shape (n, d)
-        Weight of each measurement relative to ``noise ** -2``, for each trajectory; 0 where it was
-        not observed.
     stretches : list of (int, Trajectory)
         The data between gaps, each with the number of its trajectory.
     curves : list of callable
         Each stretch smoothed, without a law: from times (n,) to states (n, d).
+    precision : ndarray, shape (n, d)
+        Weight of each measurement of all stretches relative to ``noise ** -2``; 0 where it was not
+        observed.
+    systematic : ndarray, shape (n, d, k)
+        Errors that all samples share, without what grows with the place.
+    pulls : ndarray, shape (d, d, k)
+        By how much they grow with it.
     units : Units
     noise : ndarray, shape (d,)
         Noise of the data as the smoothing estimates it.
@@ -77,12 +75,11 @@ class Problem:
 
     measured: list[Trajectory]
     trajectories: list[Trajectory]
-    systematic: list[Floats]
-    pulls: Floats
-    smoothed: list[Floats]
-    precision: list[Floats]
     stretches: list[tuple[int, Trajectory]]
     curves: Sequence[Callable[[Floats], Floats]]
+    precision: Floats
+    systematic: Floats
+    pulls: Floats
     units: Units
     noise: Floats
     form: Form
@@ -176,11 +173,6 @@ class Problem:
         return float(0.95 * self.penalties[0])
 
     @property
-    def counts(self) -> Ints:
-        """How many measurements of each coordinate count, (d,)."""
-        return sum(np.count_nonzero(precision, axis=0) for precision in self.precision)
-
-    @property
     def turns(self) -> float:
         """Turns of the motion that the data cover."""
         return float(sum(t[-1] - t[0] for t, _ in self.trajectories) / (2 * np.pi))
@@ -203,16 +195,22 @@ class Problem:
         is a whole stretch or ten turns of the motion; a part of less than two of these is none.
         """
         length = int(min(max(enough / 10, 10 * self.samples_a_turn), enough))
+        samples = np.arange(len(self.precision))
+        each = np.split(samples, np.cumsum([len(t) for _, (t, _) in self.stretches])[:-1])
         pieces = [
-            ((i, (t[k : k + length], x[k : k + length])), curve)
-            for (i, (t, x)), curve in zip(self.stretches, self.curves, strict=True)
+            ((i, (t[k : k + length], x[k : k + length])), curve, rows[k : k + length])
+            for (i, (t, x)), curve, rows in zip(self.stretches, self.curves, each, strict=True)
             for k in range(0, max(len(t) - length // 2, 1), length)
         ]
-        apart = sum(len(t) for _, (t, _) in self.stretches) // enough
+        apart = len(samples) // enough
         if apart < 2 or len(pieces) < 2 * apart:
             return self
-        stretches, curves = zip(*pieces[::apart], strict=True)
-        return replace(self, stretches=list(stretches), curves=curves)
+        stretches, curves, kept = zip(*pieces[::apart], strict=True)
+        rows = np.concatenate(kept)
+        return replace(
+            self, stretches=list(stretches), curves=curves, precision=self.precision[rows],
+            systematic=self.systematic[rows],
+        )  # fmt: skip
 
     def segments(self) -> list[Segment]:
         """The stretches with their first knots."""
@@ -230,32 +228,27 @@ class Problem:
         return found
 
     def collocation(self, segments: Sequence[Segment], noise: Floats | None = None) -> Collocation:
-        """Data and physics loss on segments; by default for the noise of the smoothing."""
-        precision, smoothed = (self._at(segments, x) for x in (self.precision, self.smoothed))
-        shared = self._shared_at(segments, smoothed)
+        """Data and physics loss on segments, one a stretch; by default for the problem's noise."""
+        shared = self._shared_at(self.smoothed())
         weights = (self.noise if noise is None else noise) ** -2
         return Collocation(
-            Grid.of(segments), self.exponents, weights, precision, np.ones(self.d), shared,
+            Grid.of(segments), self.exponents, weights, self.precision, np.ones(self.d), shared,
             self.known, self.functions,
         )  # fmt: skip
 
     def along(self, collocation: Collocation, state: State) -> Collocation:
         """The same with shared errors as the curve of a state has them: where that is, no noise."""
         curve = collocation.curve(state.control_points)
-        return replace(collocation, systematic=self._shared_at(collocation.segments, curve))
+        return replace(collocation, systematic=self._shared_at(curve))
 
-    def _shared_at(self, segments: Sequence[Segment], places: Floats) -> Floats:
-        """The errors that all samples share at the samples of segments, which are at ``places``."""
-        grown = np.einsum("ni,ijk->njk", np.nan_to_num(places), self.pulls)
-        return self._at(segments, self.systematic) + grown
+    def _shared_at(self, places: Floats) -> Floats:
+        """The errors that all samples share, where they are at these places."""
+        return self.systematic + np.einsum("ni,ijk->njk", places, self.pulls)
 
-    def _at(self, segments: Sequence[Segment], values: Sequence[Floats]) -> Floats:
-        """What is given for all samples of each trajectory, at those of segments."""
-        times = [self.trajectories[segment.trajectory][0] for segment in segments]
-        return np.concatenate([
-            values[segment.trajectory][np.searchsorted(t, segment.t)]
-            for segment, t in zip(segments, times, strict=True)
-        ])  # fmt: skip
+    def smoothed(self, later: float = 0.0) -> Floats:
+        """The curves at all samples, (n, d), or so much later."""
+        pairs = zip(self.curves, self.stretches, strict=True)
+        return np.concatenate([curve(t + later) for curve, (_, (t, _)) in pairs])
 
     def weighted(self, collocation: Collocation, weight: float) -> Collocation:
         """The same with another physics weight, relative to the slack, as far as kicks allow."""
@@ -521,11 +514,9 @@ def pose(
         errors = [np.maximum(part.compress(seen, axis=1) / scale, CLEANEST) for part in sigma]
         noise = np.nanmedian(np.concatenate(errors), axis=0)
         precision = [np.nan_to_num((noise / part) ** 2) for part in errors]
-    smoothed = [np.full(values.shape, np.nan) for _, values in trajectories]
-    for (i, (t, _)), curve in zip(stretches, curves, strict=True):
-        smoothed[i][np.searchsorted(trajectories[i][0], t)] = curve(t * speed)
+    rows = [(i, np.searchsorted(trajectories[i][0], t)) for i, (t, _) in stretches]
     modes = [part.compress(seen, axis=1) / scale[:, None] for part in systematic]
-    pulls, rest = _shared(trajectories, stretches, modes)
+    pulls, rest = _shared(trajectories, stretches, modes, [modes[i][at] for i, at in rows])
     d = len(form.names)
     here, units = np.arange(d) < 0, Units(centre, scale, step / speed)
     here[: len(seen)] = seen
@@ -544,12 +535,11 @@ def pose(
     problem = Problem(
         measured=measured,
         trajectories=[(t * speed, among(values)) for t, values in trajectories],
-        systematic=[among(part, 0.0) for part in rest],
-        pulls=grown,
-        smoothed=[among(values) for values in smoothed],
-        precision=[among(part, 0.0) for part in precision],
         stretches=[(i, (t * speed, among(values))) for i, (t, values) in stretches],
         curves=every_curve,
+        precision=among(np.concatenate([precision[i][at] for i, at in rows]), 0.0),
+        systematic=among(rest, 0.0),
+        pulls=grown,
         units=units,
         noise=spread_to_unseen(noise, here),
         form=form,
@@ -570,35 +560,32 @@ def _shared(
     trajectories: Sequence[Trajectory],
     stretches: Sequence[tuple[int, Trajectory]],
     systematic: Sequence[Floats],
-) -> tuple[Floats, list[Floats]]:
+    parts: Sequence[Floats],
+) -> tuple[Floats, Floats]:
     """By how much shared errors, (n, d, k), grow with the place, (d, d, k), and smooth remainders.
 
-    Errors of a place are those of a noisy place where they are told at the samples. In a fit such
-    errors would explain that very noise, and their sizes grow beyond all measure.
+    The errors are of each trajectory, and ``parts`` of each stretch; the remainders of all
+    stretches. Errors of a place are those of a noisy place where they are told at the samples. In a
+    fit such errors would explain that very noise, and their sizes grow beyond all measure.
     """
     x, modes = np.concatenate([x for _, x in trajectories]), np.concatenate(list(systematic))
     _, d, k = modes.shape
     rows = np.isfinite(x).all(axis=1)
     places, values = np.insert(x[rows], 0, 1.0, axis=1), modes[rows].reshape(-1, d * max(k, 1))
     if not k or not len(values):
-        return np.zeros((d, d, k)), [np.nan_to_num(part) for part in systematic]
+        return np.zeros((d, d, k)), np.concatenate(list(parts))
     pulls = np.asarray(np.linalg.lstsq(places, values)[0][1:], dtype=float).reshape(d, d, k)
-    rest = [
-        part - np.einsum("ni,ijk->njk", x, pulls)
-        for part, (_, x) in zip(systematic, trajectories, strict=True)
-    ]
-    for i, (t, _) in stretches:
-        rows = np.searchsorted(trajectories[i][0], t)
-        left = rest[i][rows].reshape(len(t), -1)
+    rest = []
+    for (_, (t, x)), part in zip(stretches, parts, strict=True):
+        left = (part - np.einsum("ni,ijk->njk", x, pulls)).reshape(len(t), -1)
         curve = smooth([(t, left)], np.random.default_rng(0)).splines[0]
-        rest[i][rows] = curve(t).reshape(-1, d, k)
-    return pulls, [np.nan_to_num(part) for part in rest]
+        rest.append(curve(t).reshape(-1, d, k))
+    return pulls, np.nan_to_num(np.concatenate(rest))
 
 
 def _with_functions(problem: Problem, rng: np.random.Generator) -> Problem:
     """The same with the functions of the library in units of their own, and checked."""
-    pieces = zip(problem.curves, problem.stretches, strict=True)
-    x = problem.units.point(np.concatenate([curve(t) for curve, (_, (t, _)) in pieces]))
+    x = problem.units.point(problem.smoothed())
     functions = problem.form.functions
     values = extended(x, functions)[:, problem.d :]
     for function, column in zip(functions, values.T, strict=True):
