@@ -644,17 +644,16 @@ def _samples(
     angles, errors, rng = [], [], np.random.default_rng(0)
     for (t, _), angle, known in zip(runs, np.split(circle.angle, sizes), given, strict=True):
         seen = np.isfinite(angle)
-        angles.append((t[seen], angle[seen, None]))
+        t, angle = t[seen], angle[seen, None]
         # Without the noise of the samples, which would explain itself.
-        curve = smooth([angles[-1]], rng).splines[0](t[seen])
+        curve = smooth([(t, angle)], rng).splines[0](t)
         across = np.hstack([np.sin(curve), -np.cos(curve)]) @ moves
-        errors.append(np.hstack([known[seen], across])[:, None])
-    parts = []
-    for (t, angle), error in zip(angles, errors, strict=True):
+        error = np.hstack([known[seen], across])[:, None]
         for part in _rounds(angle[:, 0]):
             turn = 2 * np.pi * np.round(angle[part].mean() / (2 * np.pi))  # nearest to its middle
-            parts.append(((t[part], angle[part] - turn), error[part]))
-    return [run for run, _ in parts], [error for _, error in parts]
+            angles.append((t[part], angle[part] - turn))
+            errors.append(error[part])
+    return angles, errors
 
 
 def _rounds(angle: Floats, most: float = 4 * 2 * np.pi) -> list[Bools]:
