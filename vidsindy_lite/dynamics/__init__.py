@@ -16,24 +16,16 @@
               body), `homogeneous` (of one flight, the law that is the same at every place)
 """
 
-from .library import Library, check_library
-from .collocation import Collocation, Status
-from .result import Discovery
-from .model import Form
-from .model import runge_kutta_4
-from .library import Function, monomial_exponents, monomials, shift_matrix
-from .diagnostics import CLOSE
-from .solver import check_order
-from .homogeneous import homogeneous
-from .result import Swing
-from .model import PolynomialSystem
+from .data import Trajectory, Units, check_trajectory, cut, typical_step, variable_names
+from .bspline import DEGREE, Segment, clamped_knots, design_matrix, local_basis, smooth
+from .library import Function, Library, check_library, monomial_exponents, monomials, shift_matrix
+from .model import Form, PolynomialSystem, runge_kutta_4
+from .collocation import Collocation, State, Status
 from .problem import FALSE_ALARM, fit_curves, term_penalties
-from .mechanics import Quantity, Round, on_circle, on_sphere
 from .l0 import closest_rival, subset_search
-from .bspline import smooth
-from .solver import discover
-from .bspline import DEGREE, Segment, clamped_knots, design_matrix, local_basis
-from .collocation import State
-from .data import Trajectory, check_trajectory, cut, typical_step, variable_names
 from .orientation import check_orientation
-from .data import Units
+from .mechanics import Quantity, Round, on_circle, on_sphere
+from .homogeneous import homogeneous
+from .result import Discovery, Swing
+from .diagnostics import CLOSE
+from .solver import check_order, discover
