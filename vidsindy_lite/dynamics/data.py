@@ -119,9 +119,7 @@ def variable_names(d: int) -> tuple[str, ...]:
     return tuple("xyzw"[:d]) if d <= 4 else tuple(f"x{i + 1}" for i in range(d))
 
 
-def coordinate_names(
-    t: Floats | Sequence[tuple[Floats, Floats]], x: Floats | None
-) -> tuple[str, ...]:
+def coordinate_names(pairs: Sequence[tuple[Floats, Floats]]) -> tuple[str, ...]:
     """Names of the coordinates: of the columns of data frames, if all are names; else x, y, ...
 
     Raises
@@ -129,18 +127,17 @@ def coordinate_names(
     ValueError
         If the columns of several trajectories are not named alike.
     """
-    frames = [x] if x is not None else [values for _, values in t]
-    columns = [list(getattr(frame, "columns", [])) for frame in frames]
+    columns = [list(getattr(frame, "columns", [])) for _, frame in pairs]
     if any(names != columns[0] for names in columns):
         raise ValueError(f"x: columns must be named alike in all trajectories, got {columns}")
-    for times, frame in [(t, x)] if x is not None else t:
+    for times, frame in pairs:
         for name in columns[0]:
             clock = str(name).lower() in ("t", "time", "times", "seconds", "timestamp")
             if clock and np.array_equal(frame[name], times):
                 raise ValueError(f"x: must hold states alone, got the times as column {name!r}")
     if columns[0] and all(isinstance(name, str) and name.isidentifier() for name in columns[0]):
         return tuple(columns[0])
-    return variable_names(np.shape(frames[0])[1])
+    return variable_names(np.shape(pairs[0][1])[1])
 
 
 def check_sigma(

@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from threading import Lock
+from typing import cast
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -146,8 +147,8 @@ def discover(
     check_order(order, origin)
     trajectories = check_trajectories(t, x)
     check_orientation(orientation, library, trajectories[0][1].shape[1], origin)
-    names = coordinate_names(t, x)
-    times = [np.asarray(pair[0]) for pair in (t if x is None else [(t, x)])]
+    pairs = cast("Sequence[tuple[Floats, Floats]]", t if x is None else [(t, x)])
+    names, times = coordinate_names(pairs), [np.asarray(times) for times, _ in pairs]
     shared = check_systematic(systematic, times, trajectories)
     measured = trajectories, shared, check_sigma(sigma, times, trajectories)
     limit = np.inf if time_limit is None else check_positive("time_limit", time_limit)
