@@ -161,11 +161,8 @@ def homogeneous(
         return flight.theta**2 > penalty * np.diag(errors)
 
     kept = flight.free & (told(covariance + shared) | (numbers < 2 * m))
-    law, its = flight, shared
-    if (kept != flight.free).any():
-        law = Flight.fitted(since, x, kept)
-        its = law.shared(since, x, modes)
-    covariance = covariance + its
+    law = Flight.fitted(since, x, kept)
+    covariance = covariance + law.shared(since, x, modes)
     found = _told(law, covariance * np.outer(kept, kept), t, names)
     spread, classes[best] = np.linalg.norm(x.std(axis=0)), law
     supports = [coefficients_of(one.theta, found.system.exponents) != 0 for one in classes]
