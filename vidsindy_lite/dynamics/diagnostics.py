@@ -440,11 +440,9 @@ def diagnose(
     wider = widened(problem, fit)
     # Without errors that the splines could tell from their own: what is clean cannot be cleaner.
     clean = bool((fit.collocation.data_weights**-0.5 <= CLEANEST).all())
-    remedy = (
-        "a longer trajectory, denser samples or other starts"
-        if clean
-        else "cleaner samples or a longer trajectory"
-    )
+    remedy = "cleaner samples or a longer trajectory"
+    if clean:
+        remedy = "a longer trajectory, denser samples or other starts"
     return (
         *outliers(problem.measured, _met(problem, fit)),
         *_shape(problem, fit),
