@@ -306,12 +306,9 @@ def _higher(exponents: Ints, d: int, most: float) -> Ints:
     plain = exponents[(exponents[:, d:] == 0).all(axis=1), :d]
     higher = monomial_exponents(d, int(plain.sum(axis=1).max(initial=0)) + 2)
     higher = higher[~(higher[:, None] == plain).all(axis=2).any(axis=1)]
-    for variables in (d, 2, 1):
-        kept = higher[(higher > 0).sum(axis=1) <= variables]
-        if len(kept) <= most:
-            unused = ((0, 0), (0, exponents.shape[1] - d))
-            return np.concatenate([exponents, np.pad(kept, unused)])
-    return exponents
+    fewer = (higher[(higher > 0).sum(axis=1) <= variables] for variables in (d, 2, 1))
+    kept = next((some for some in fewer if len(some) <= most), higher[:0])
+    return np.concatenate([exponents, np.pad(kept, ((0, 0), (0, exponents.shape[1] - d)))])
 
 
 # --------------------------------------------------------------------------------------------------
@@ -621,12 +618,9 @@ def _contested(problem: Problem, state: State, path: Path, remedy: str) -> Itera
 
 
 def _range(low: float, high: float) -> str:
-    """Two ends with as many digits as tell them apart."""
-    for digits in range(1, 4):
-        ends = f"{low:.{digits}g}", f"{high:.{digits}g}"
-        if ends[0] != ends[1]:
-            return f"from {ends[0]} to {ends[1]}"
-    return f"at {ends[0]}"
+    """Two ends with as many digits as tell them apart, three at most."""
+    digits = next((n for n in (1, 2) if f"{low:.{n}g}" != f"{high:.{n}g}"), 3)
+    return f"from {low:.{digits}g} to {high:.{digits}g}"
 
 
 def _rivals(
