@@ -30,7 +30,8 @@ LARGEST_SIDE = 32768  #: Pixels of a camera's image, in width and in height: no 
 #: What is raised where something from outside is turned into values, and is malformed.
 MALFORMED = (
     ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RuntimeError, ImportError,
-    EOFError, MemoryError, SyntaxError, SystemError, BadZipFile, zlib.error, struct.error, csv.Error,
+    EOFError, MemoryError, SyntaxError, SystemError, BadZipFile, csv.Error, struct.error,
+    zlib.error,
 )  # fmt: skip
 
 
