@@ -181,7 +181,7 @@ def entire(views: Sequence[View | None]) -> tuple[list[View | None], tuple[str, 
     views : sequence of View or None
         By the target's colour, one a frame.
     """
-    parts = _usual_ones(views)
+    parts = [one if one and one.area > 0 else None for one in views]
     both = [(one, one.whole) for one in views if one is not None and one.whole is not None]
     areas = np.array([[one.area, all_.area] for one, all_ in both]).reshape(-1, 2)
     offset = np.array([one.centroid - all_.centroid for one, all_ in both]).reshape(-1, 2)
@@ -201,25 +201,6 @@ def entire(views: Sequence[View | None]) -> tuple[list[View | None], tuple[str, 
         return [one and (one.whole or one) for one in views], ()
     return parts, ("the target has several colours, or touches other things: perhaps only a part "
                    "of it is followed",)  # fmt: skip
-
-
-def _usual_ones(views: Sequence[View | None]) -> list[View | None]:
-    """Of each view by the target's colour and that of the whole, the one of the usual size.
-
-    Where the light on the target changes, as at a shadow's edge, its colour is that of a part only.
-    """
-    areas = np.array([(one.area, one.whole.area if one.whole else 0.0) if one else (0.0, 0.0)
-                      for one in views]).reshape(-1, 2)  # fmt: skip
-    shown = np.flatnonzero(areas[:, 0] > 0)
-    if not len(shown):
-        return [None] * len(views)
-    # Views around one say how large it usually is.
-    usual = np.interp(np.arange(len(views)), shown, median_filter(areas[shown, 0], 31))
-    off = np.abs(np.log(np.maximum(areas, 1e-3) / usual[:, None]))
-    # Areas of whole views scatter by less.
-    better = off[:, 1] < np.minimum(off[:, 0], np.log(1.15))
-    best = [one.whole if one and fits else one for one, fits in zip(views, better, strict=True)]
-    return [one if one and one.area > 0 else None for one in best]
 
 
 def displaced(
