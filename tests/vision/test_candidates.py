@@ -150,7 +150,7 @@ def test_it_is_followed_both_ways_from_where_it_is_known(tmp_path):
     two = np.array([*PLACES[5:6], [20.0, 20]])  # the target and a piece of ground
     box, black = np.hstack([two - 8, np.full((2, 2), 17.0)]), np.zeros((2, 3))
     found = Candidates(np.full(2, 5), two, two, box, np.full(2, 200.0), black, black, np.ones(2))
-    looks = followed(frames, maps, found, Spot(10, PLACES[10], np.array([17.0, 17])), np.zeros(2))
+    looks = followed(frames, maps, found, Spot(10, PLACES[10], np.array([17.0, 17])))
     shown = ~np.isin(np.arange(N), hidden)
     assert np.linalg.norm(looks.box[shown, :2] - PLACES[shown], axis=1).max() < 1.5
     assert looks.fit[10] == 1

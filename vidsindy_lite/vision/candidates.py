@@ -570,7 +570,7 @@ def _top(values: Floats) -> float:
     return float(np.clip(0.5 * (before - after) / (before - 2 * here + after - 1e-9), -0.5, 0.5))
 
 
-def followed(frames: Reel, maps: Floats, found: Candidates, seed: Spot, pace: Floats) -> Looks:
+def followed(frames: Reel, maps: Floats, found: Candidates, seed: Spot) -> Looks:
     """Follow a target by its looks, both ways.
 
     Parameters
@@ -581,8 +581,6 @@ def followed(frames: Reel, maps: Floats, found: Candidates, seed: Spot, pace: Fl
         Of reduced frames.
     found : Candidates
     seed : Spot
-    pace : ndarray, shape (2,)
-        By how much a frame it moves there: what is small is soon beyond its looks.
     """
     n = len(maps)
     factor = frames.factor if frames.whole.few else 1
@@ -602,7 +600,7 @@ def followed(frames: Reel, maps: Floats, found: Candidates, seed: Spot, pace: Fl
             gap = abs(i - last[-1][0])
             if i == first or gap > 60:  # frames after which nothing is known of its looks
                 continue
-            speed = way * pace
+            speed = np.zeros(2)
             if len(last) > 1:
                 speed = (last[-1][1] - last[-2][1]) / abs(last[-1][0] - last[-2][0])
             ahead = carry(np.linalg.inv(maps[i]), (last[-1][1] + speed * min(gap, 8))[None])[0]

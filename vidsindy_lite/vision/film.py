@@ -174,7 +174,7 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
     if seed is None and len(rows) == n and not _rivals(paths):  # nothing is left to be told
         looks = Looks(np.full((n, 4), np.nan), np.zeros(n), np.ones(len(seen.frame)))
     else:
-        looks = followed(film.frames, film.maps[:n], seen, start, _pace(seen, rows, start.frame))
+        looks = followed(film.frames, film.maps[:n], seen, start)
     both = _together(seen, looks, film.maps, start.frame, told=seed is not None, moves=bool(paths))
     rows, _ = best_path(both, away=True)
     if len(rows) < _SHORTEST:
@@ -273,14 +273,6 @@ def _plainest(seen: Candidates, rows: Ints) -> Spot:
 def _spot(seen: Candidates, row: np.integer) -> Spot:
     """Where a candidate is, and how large, four pixels at least."""
     return Spot(int(seen.frame[row]), seen.centre[row], np.maximum(seen.box[row, 2:], 4))
-
-
-def _pace(seen: Candidates, rows: Ints, frame: int) -> Floats:
-    """By how much a frame a path moves around a frame, (2,)."""
-    near = rows[np.abs(seen.frame[rows] - frame) <= 2]
-    if len(near) < 2:
-        return np.zeros(2)
-    return np.asarray(np.polyfit(seen.frame[near], seen.place[near], 1)[0])
 
 
 def _rivals(paths: Sequence[Motion]) -> Sequence[Motion]:
