@@ -637,12 +637,10 @@ def followed(frames: Reel, maps: Floats, found: Candidates, seed: Spot) -> Looks
 def _in_order(frames: Reel, first: int, way: int, n: int) -> Iterator[tuple[int, Image]]:
     """The frames, reduced if they are many, with their numbers from one on, in both directions."""
     film = frames.whole if frames.whole.few else frames
-    if way > 0:
-        yield from ((i, frame) for i, frame in zip(range(n), film, strict=False) if i >= first)
-        return
-    for last in range(first + 1, 0, -50):
-        numbers = range(max(last - 50, 0), last)
-        yield from reversed(list(zip(numbers, film.pick(numbers), strict=False)))
+    numbers = range(first, n) if way > 0 else range(first, -1, -1)
+    for k in range(0, len(numbers), 50):  # at once in the memory
+        block = numbers[k : k + 50][::way]
+        yield from list(zip(block, film.pick(block), strict=False))[::way]
 
 
 def _near(found: Candidates, like: Floats, ahead: Floats, size: Floats, gap: int) -> list[Floats]:
