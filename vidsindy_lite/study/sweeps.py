@@ -265,7 +265,7 @@ def _digest(content: str) -> str:
 
 
 def _built(place: str, parts: dict[str, Any]) -> Any:
-    """A dataclass of the package with these very fields, as its constructor might round them."""
+    """A dataclass of the package with these very fields: its constructor might round them."""
     module, _, name = place.partition(":")
     if module.partition(".")[0] != PACKAGE.name:
         raise ValueError(f"not of the package: {place}")
@@ -273,7 +273,6 @@ def _built(place: str, parts: dict[str, Any]) -> Any:
     names = {field.name for field in fields(kind)} if is_dataclass(kind) else {None}
     if parts.keys() != names:
         raise ValueError(f"no such dataclass: {place} of {', '.join(parts)}")
-    value = kind(**{field.name: parts[field.name] for field in fields(kind) if field.init})
-    for name, part in parts.items():
-        object.__setattr__(value, name, part)
+    value = object.__new__(kind)
+    vars(value).update(parts)
     return value
