@@ -124,14 +124,11 @@ class Plate:
         self.size = np.array(samples[0].shape[1::-1])
         self.moves = not np.allclose(maps, np.eye(3))
         corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * (self.size - 1.0)
-        ends = [carry(h, corners) for h in maps]
-        low = np.floor(np.percentile([e.min(axis=0) for e in ends], 5, axis=0))
-        high = np.ceil(np.percentile([e.max(axis=0) for e in ends], 95, axis=0))
-        middle = carry(maps[len(maps) // 2], corners).mean(axis=0)
-        # Frames that the plate may hold, side by side.
-        reach = self.size * np.sqrt(2.5) / 2
-        low = np.floor(np.maximum(low, middle - 1.5 * reach))
-        high = np.minimum(high, middle + 1.5 * reach)
+        ends = np.array([carry(h, corners) for h in maps])
+        # It reaches so many sides of a frame from the middle of the one in the middle.
+        middle, most = ends[len(ends) // 2].mean(axis=0), 1.2 * self.size
+        low = np.floor(np.maximum(ends.min(axis=(0, 1)), middle - most))
+        high = np.minimum(ends.max(axis=(0, 1)), middle + most)
         self.shift = np.array([[1, 0, -low[0]], [0, 1, -low[1]], [0, 0, 1.0]])
         width, height = (int(x) for x in np.ceil(high - low) + 1)
         shows = [np.full(samples[0].shape[:2], 255, np.uint8)] * len(samples)
