@@ -19,7 +19,6 @@ one meeting to the next.
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple, Self
 
@@ -427,20 +426,18 @@ def _doubts(film: Film, seen: Candidates, paths: list[Motion], ways: Ways) -> tu
 
 def expected(seen: Candidates, rows: Ints, film: Film, n: int) -> Ways:
     """Where a path leads in all frames from its first to its last, and a little beyond."""
-    at, place = seen.frame[rows], seen.place[rows]
+    at, place, usual = seen.frame[rows], seen.place[rows], np.median(seen.colour[rows], axis=0)
     frames = np.arange(max(at[0] - 3, 0), min(at[-1] + 3, n - 1) + 1)
-    along = np.column_stack([np.interp(frames, at, x) for x in place.T])
+    known = np.hstack([place, seen.box[rows, 2:], seen.colour[rows]])
+    between = np.column_stack([np.interp(frames, at, x) for x in known.T])
+    along, extent, near = np.split(between, [2, 4], axis=1)
     for outside, end in ((frames < at[0], slice(0, 4)), (frames > at[-1], slice(-4, None))):
-        if outside.any():
-            fit = np.polyfit(at[end] - at[end][0], place[end], min(2, len(at[end]) - 1))
-            along[outside] = np.vander(frames[outside] - at[end][0], len(fit)) @ fit
-    extent = np.column_stack([np.interp(frames, at, x) for x in seen.box[rows, 2:].T])
-    centre, box, colour = np.full((n, 2), np.nan), np.full((n, 4), np.nan), np.zeros((n, 3))
+        fit = np.polyfit(at[end] - at[end][0], place[end], 2)
+        along[outside] = np.vander(frames[outside] - at[end][0], 3) @ fit
+    centre, box, colour = (np.full((n, width), np.nan) for width in (2, 4, 3))
     centre[frames] = carry(np.linalg.inv(film.maps[frames]), along)
-    box[frames] = np.column_stack([centre[frames] - extent / 2, extent])
-    colour[:] = np.median(seen.colour[rows], axis=0)
-    near = np.column_stack([np.interp(frames, at, x) for x in seen.colour[rows].T])
-    colour[frames] = 0.5 * colour[frames] + 0.5 * near
+    box[frames] = np.hstack([centre[frames] - extent / 2, extent])
+    colour[frames] = 0.5 * usual + 0.5 * near
     k = film.frames.factor
     return Ways(k * centre + (k - 1) / 2, k * box, colour)
 
@@ -573,12 +570,11 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
 
 def _touching(ways: list[Ways]) -> list[Bools]:
     """In which frames each target touches another one, or hides it."""
-    found = [np.zeros(len(ways[0].centre), bool) for _ in ways]
-    for (i, one), (j, other) in combinations(enumerate(ways), 2):
+
+    def met(one: Ways, other: Ways) -> Bools:
         apart = np.linalg.norm(one.centre - other.centre, axis=1)
         sizes = (one.box[:, 2:].max(axis=1) + other.box[:, 2:].max(axis=1)) / 2
         # Sizes, and pixels more, between two targets that do not touch.
-        met = apart < 1.3 * sizes + 2.0
-        found[i] |= met
-        found[j] |= met
-    return found
+        return np.asarray(apart < 1.3 * sizes + 2.0)
+
+    return [np.any([met(one, other) for other in ways if other is not one], axis=0) for one in ways]
