@@ -605,12 +605,8 @@ def followed(frames: Reel, maps: Floats, found: Candidates, seed: Spot) -> Looks
                 speed = (last[-1][1] - last[-2][1]) / abs(last[-1][0] - last[-2][0])
             ahead = carry(np.linalg.inv(maps[i]), (last[-1][1] + speed * min(gap, 8))[None])[0]
             near = _near(found.only(here), like[here], ahead, size, gap)
-            tries: list[Floats] = []
-            for one in [ahead, *near]:
-                if not any(np.linalg.norm(one - other) < size.min() / 4 for other in tries):
-                    tries.append(one)
             views = []
-            for place, answer, colour in (looks.find(frame, centre, size) for centre in tries):
+            for place, answer, colour in (looks.find(frame, one, size) for one in [ahead, *near]):
                 apart = np.linalg.norm(place - ahead) / (size.max() + 8)
                 moved = any(np.linalg.norm(place - one) < size.min() / 2 for one in near)
                 score = 0.7 * answer + 0.3 * colour + 0.25 * moved - 0.1 * apart
