@@ -44,9 +44,8 @@ class View:
     """One look at the target, in pixels of its frame.
 
     Centroid (2,), area, mean colour, is it clear of the image's border?, skewness (2,), see
-    `_skewness`, NaN before ground of its own colour; `whole` is the view of it with all that has
-    another colour in one piece with it, if compact. The area is 0 where nothing has the target's
-    colour.
+    `_skewness`; `whole` is the view of it with all that has another colour in one piece with it, if
+    compact. The area is 0 where nothing has the target's colour.
     """
 
     centroid: Floats
@@ -132,11 +131,8 @@ class Lens:
         centroid = np.array([moments["m10"], moments["m01"]]) / max(area, 1e-9)
         first, end = _extent(label, low)
         inside = bool((first > 0).all() and (end < self.plate.size).all())
-        # Share of the ground around it that does not show where it ends.
-        blind = (square[near & ~label] < self.least**2).mean() > 0.1
-        skewness = np.full(2, np.nan) if blind else _skewness(moments)
         shade = now[core if core.any() else label].mean(axis=0)
-        return View(low + centroid, area, shade, inside, skewness)
+        return View(low + centroid, area, shade, inside, _skewness(moments))
 
 
 def _skewness(moments: Mapping[str, float]) -> Floats:
@@ -209,28 +205,22 @@ def displaced(
     """Pixels by which views (n,) are off the target, as their outlines say, and a bound to them.
 
     The usual skewness is the commonest one: whole views, at least a third of all, lie close around
-    it; of a view without any only the area counts. The usual area is that of the views around. By
-    no more than the bound whole views may seem to be off: that is how the most alike of them
-    differ, and how their path scatters.
+    it. The usual area is that of the views around. By no more than the bound whole views may seem
+    to be off: that is how the most alike of them differ, and how their path scatters.
     """
     if not inside.any():
         return np.full(len(areas), np.inf), 0.0
     half, logs = np.sqrt(np.median(areas[inside])) / 2, np.log(np.maximum(areas, 1e-3))
-    sound, third = inside & np.isfinite(skewness[:, 0]), inside.sum() // 3
-    off = np.zeros(len(areas))
-    if sound.sum() <= third:
-        sound = inside
-    else:
-        some = skewness[sound][:: 1 + sound.sum() // 200]
-        apart = cdist(some, skewness[sound])
-        off[sound] = half * apart[np.partition(apart, third, axis=1)[:, third].argmin()]
+    some, third = skewness[inside][:: 1 + inside.sum() // 200], inside.sum() // 3
+    apart = cdist(some, skewness)
+    off = half * apart[np.partition(apart[:, inside], third, axis=1)[:, third].argmin()]
 
     def bound() -> float:
-        best = sound & (off <= np.quantile(off[sound], 0.75))
-        alike, rough = np.partition(off[sound], third)[third], scatter(frames[best], places[best])
+        best = inside & (off <= np.quantile(off[inside], 0.75))
+        alike, rough = np.partition(off[inside], third)[third], scatter(frames[best], places[best])
         return float(max(0.05, 8 * alike, 12 * rough if np.isfinite(rough) else 0.0))
 
-    use = np.flatnonzero(sound & (off < bound()))
+    use = np.flatnonzero(inside & (off < bound()))
     if len(use) >= _AROUND:
         off = np.maximum(off, half * np.abs(logs - _trend(frames, frames[use], logs[use])))
     off[~inside] = np.inf
