@@ -160,10 +160,7 @@ def _nearest(mask: Bools, centre: Floats) -> Bools | None:
         return None
     area = stats[1:, cv2.CC_STAT_AREA]
     apart = np.linalg.norm(centres[1:] - centre, axis=1)
-    best = 1 + int(np.argmax(area / (1 + (apart / (2 + np.sqrt(area))) ** 2)))
-    if stats[best, cv2.CC_STAT_AREA] < 4:
-        return None
-    return labels == best
+    return labels == 1 + int(np.argmax(area / (1 + (apart / (2 + np.sqrt(area))) ** 2)))
 
 
 def entire(views: Sequence[View | None]) -> tuple[list[View | None], tuple[str, ...]]:
