@@ -165,8 +165,7 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
     if covered is not None:  # it covers its own ground: before ground that is without it
         others = sighted(film, covered, bare=bare)
         plainer = _paths(others[0], hint, seed)
-        # A path that is far less plain there is of what was taken out in its place.
-        if plainer and _worth(others[0], plainer[0]) >= 0.5 * _worth(seen, paths[0]):
+        if plainer:
             (seen, lights), paths = others, plainer
     rows = paths[0].rows if paths else np.zeros(0, int)
     start = seed or _plainest(seen, rows)
@@ -277,11 +276,6 @@ def _spot(seen: Candidates, row: np.integer) -> Spot:
 def _rivals(paths: Sequence[Motion]) -> Sequence[Motion]:
     """Paths that are about as plain as the plainest."""
     return [path for path in paths[1:] if path.rating > 0.5 * paths[0].rating]
-
-
-def _worth(seen: Candidates, path: Motion) -> float:
-    """How plain a path is, however far it travels: parts of a whole may travel farther."""
-    return float(seen.quality[path.rows].sum())
 
 
 def _covering(film: Film, seen: Candidates, rows: Ints, seed: Spot | None) -> Floats | None:
