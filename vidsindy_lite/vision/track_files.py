@@ -506,7 +506,7 @@ def _seen(columns: Mapping[str, Floats]) -> Bools:
             seen &= values >= 0.6  # DeepLabCut's own limit
         elif key in _SEEN:
             seen &= ~(values <= 0)
-        elif key in ("occluded", "lost", "missing", "outside", "invisible"):
+        elif key in _HIDDEN:
             seen &= ~(values > 0)
     return seen
 
