@@ -36,7 +36,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from itertools import product
 from types import CodeType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -92,20 +92,15 @@ class Equation:
         return self.law is not None and bool(self.law.exponents.sum(axis=1).max() <= 3)
 
 
-def _value(formula: str, values: Mapping[str, Any]) -> Any:
+def _value(formula: str | CodeType, values: Mapping[str, Any]) -> Any:
     """Value of a formula of this package's file, for which its names have these values."""
-    return eval(_compiled(formula), {"__builtins__": {}, **_NAMES}, dict(values))
-
-
-@cache
-def _compiled(formula: str) -> CodeType:
-    return compile(formula, "odebench.toml", "eval")
+    return eval(formula, {"__builtins__": {}, **_NAMES}, dict(values))
 
 
 def _equation(number: str, record: Mapping[str, Any]) -> Equation:
     """An equation from its record; a parameter may be a fraction: "8/3"."""
     parameters = {name: _value(str(v), {}) for name, v in record["parameters"].items()}
-    law, rates = None, record.get("rates", {})
+    law, rates = None, {k: compile(v, k, "eval") for k, v in record.get("rates", {}).items()}
     if "terms" in record:
         law = PolynomialSystem.from_terms({
             variable: {term: _value(text, parameters) for term, text in terms.items()}
@@ -114,7 +109,7 @@ def _equation(number: str, record: Mapping[str, Any]) -> Equation:
 
     def rate(x: Floats) -> Floats:
         values = parameters | dict(zip(rates, x, strict=True))
-        return np.array([_value(text, values) for text in rates.values()])
+        return np.array([_value(formula, values) for formula in rates.values()])
 
     starts = tuple(tuple(map(float, start)) for start in record["starts"])
     return Equation(int(number), record["name"], record["source"], law or rate, law, starts)
