@@ -600,10 +600,9 @@ def followed(frames: Reel, maps: Floats, found: Candidates, seed: Spot) -> Looks
             gap = abs(i - last[-1][0])
             if i == first or gap > 60:  # frames after which nothing is known of its looks
                 continue
-            speed = np.zeros(2)
-            if len(last) > 1:
-                speed = (last[-1][1] - last[-2][1]) / abs(last[-1][0] - last[-2][0])
-            ahead = carry(np.linalg.inv(maps[i]), (last[-1][1] + speed * min(gap, 8))[None])[0]
+            before, now = last[0], last[-1]  # the same at first
+            speed = (now[1] - before[1]) / max(abs(now[0] - before[0]), 1)
+            ahead = carry(np.linalg.inv(maps[i]), (now[1] + speed * min(gap, 8))[None])[0]
             near = _near(found.only(here), like[here], ahead, size, gap)
             views = []
             for place, answer, colour in (looks.find(frame, one, size) for one in [ahead, *near]):
@@ -626,7 +625,7 @@ def followed(frames: Reel, maps: Floats, found: Candidates, seed: Spot) -> Looks
                     break
             box[i], fit[i] = [*place, *size], answer
             looks.learn(frame, place, size, 0.03)
-            last = [*last, (i, carry(maps[i], place[None])[0])][-3:]
+            last = [now, (i, carry(maps[i], place[None])[0])]
     return Looks(box, fit, like)
 
 
