@@ -24,17 +24,12 @@ SETTINGS = {
     "03": [{"system": "WangSun", "seed": 1}, {"frames": 300, "pixel_noise": 1.0, "seed": 2}],
     "04": [{"level": 0.05}, {"seed": 1}],
     "04b": [{"level": 0.05}, {"seed": 1}],
-    "05": [{"seed": 10}, {"seed": 20}],
     "06": [{"seed": 10}, {"seed": 20, "share": 0.05}],
-    "07": [{"seed": 10}, {"seed": 20}],
     "08": [{"seed": 1}, {"camera": 3}],
-    "09": [{"seed": 1}, {"seed": 2}],
-    "10": [{"seed": 1}, {"seed": 2}],
-    "10b": [{"seed": 1}, {"seed": 2}],
-    "11": [{"seed": 10}, {"seed": 20}],
     "12": [{"fps": 60}, {"seed": 1}],
     "13": [{"seed": 1}, {"fps": 60}],
-    "14": [{"seed": 1}, {"seed": 2}],
+    **dict.fromkeys(("05", "07", "11"), [{"seed": 10}, {"seed": 20}]),
+    **dict.fromkeys(("09", "10", "10b", "14"), [{"seed": 1}, {"seed": 2}]),
 }
 QUICK = ("10", {"seed": 1})
 
