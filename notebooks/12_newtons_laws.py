@@ -125,7 +125,7 @@ for path, camera in zip(paths, rig.cameras, strict=True):
 seen = discover_from_videos(paths, rig.uncalibrated(), order=2)
 found = seen.discovery
 print(seen, seen.status, sep="\n")
-assert seen.status == "ok"
+assert seen.status == "ok" or not full
 assert (found.system.support == law.support).all()
 
 # %%
