@@ -591,8 +591,9 @@ def _with_shared(
 ) -> Round:
     """What is fitted to positions, and what each error that they share makes of it."""
     x = check_array("x", positions)
-    if x.ndim != 2 or x.shape[1] not in (3, 3 if sphere else 2):
-        wanted = "(n, 3)" if sphere else "(n, 2) or (n, 3)"
+    dimensions = (3,) if sphere else (2, 3)
+    if x.ndim != 2 or x.shape[1] not in dimensions:
+        wanted = " or ".join(f"(n, {d})" for d in dimensions)
         raise ValueError(f"x: must have shape {wanted}, got {x.shape}")
     (n, d), seen = x.shape, np.isfinite(x).all(axis=1)
     if seen.sum() < d + 3:
