@@ -45,6 +45,8 @@ def test_the_frame_is_that_of_the_first_camera_and_is_told():
     assert learned.note in learned.text()
     assert vl.learn_cameras(tracks, learned).note == learned.note
     assert posed(tracks, learned) is learned
+    with pytest.raises(ValueError, match="cameras stand.* got no start"):
+        posed([track[:7] for track in tracks], lenses(rng, rig))
 
 
 def test_a_known_distance_gives_the_unit_of_length():

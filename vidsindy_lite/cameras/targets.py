@@ -221,7 +221,8 @@ def _link(one: _Run, other: _Run, cameras: Sequence[Camera]) -> tuple[float, lis
 def _surest(count: int, misfit: Callable[[list[int]], float]) -> tuple[float, list[int]]:
     """How many times better the best order of targets fits than the next one, and which it is."""
     ranked = sorted((misfit(order), order) for order in map(list, permutations(range(count))))
-    return ranked[1][0] / max(ranked[0][0], 1e-9), ranked[0][1]
+    second = ranked[1][0] if len(ranked) > 1 else np.inf
+    return second / max(ranked[0][0], 1e-9), ranked[0][1]
 
 
 def _on_from(
@@ -234,8 +235,9 @@ def _on_from(
     x, there = x[there < start][-_AHEAD:], there[there < start][-_AHEAD:]
     y, here = y[:_AHEAD], here[:_AHEAD]
     count, frames = y.shape[1], np.concatenate((there, here))
-    if min(len(x), len(y)) < _DEGREE or here[0] - there[-1] > 4 * _AHEAD:
-        return [], False  # too long a gap tells nothing
+    # One goes on wherever it is; of several, too long a gap tells nothing.
+    if count == 1 or min(len(x), len(y)) < _DEGREE or here[0] - there[-1] > 4 * _AHEAD:
+        return [*range(count)], count == 1
     sure, order = _surest(count, lambda o: _roughness(frames, np.concatenate((x, y[:, o]))))
     return order, sure > ALIKE
 

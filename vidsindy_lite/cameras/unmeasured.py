@@ -39,6 +39,7 @@ from .clocks import OVERLAP, Footage, Lags, dips, untold_lags
 from .models import ROUNDING, AffineCamera, PerspectiveCamera, at_once, missed
 from .rig import ALIKE, BETTER, FINE, GROSS, Rig, check_views
 
+_FEWEST = 8  # frames in common of a pair
 _VIEWS = np.geomspace(2, 90, 15)  # degrees across an image: what lenses have
 _STEPS = 30  # of each search
 
@@ -141,6 +142,8 @@ def _around(
     """
     i, j = pair
     both = np.isfinite(rays[i]).all(axis=1) & np.isfinite(rays[j]).all(axis=1)
+    if both.sum() < _FEWEST:
+        return None
     seen, centre = (rays[i][both], rays[j][both]), np.eye(3)
     points = np.full((len(rays[0]), 3), np.nan)
     turns, shifts = np.array([np.eye(3)] * len(rays)), np.zeros((len(rays), 3))
@@ -156,16 +159,20 @@ def _around(
         points[both] = np.where(front > 0, (homogeneous[:3] / homogeneous[3]).T, np.nan)
         for k in set(range(len(cameras))) - set(pair):
             told = np.isfinite(points).all(axis=1) & np.isfinite(rays[k]).all(axis=1)
-            _, axis, place, _ = cv2.solvePnPRansac(
+            if told.sum() < _FEWEST:
+                return None
+            done, axis, place, _ = cv2.solvePnPRansac(
                 points[told], rays[k][told], centre, None, flags=cv2.SOLVEPNP_SQPNP,
                 reprojectionError=3 * GROSS / cameras[k].focal_length,
             )  # fmt: skip
+            if not done:
+                return None
             turns[k], shifts[k] = cv2.Rodrigues(axis)[0], place[:, 0]
         turns = turns @ turns[0].T
         shifts = shifts - turns @ shifts[0]
         each = zip(cameras, turns * [1, -1, -1], shifts / np.linalg.norm(shifts[1]), strict=True)
         return tuple(camera.posed(turn, shift) for camera, turn, shift in each)
-    except (cv2.error, ValueError):  # too few points, too close together, or of nothing that moves
+    except (cv2.error, ValueError):  # points too close together, or of nothing that moves
         return None
 
 
