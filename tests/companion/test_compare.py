@@ -82,7 +82,7 @@ def test_a_record_may_state_a_tolerance(folders, tolerance, same):
     assert list(differences(*folders)) == ([] if same else ["table_1"])
 
 
-@pytest.mark.parametrize("content", [None, "{", "null", "[" * 100_000])
+@pytest.mark.parametrize("content", [None, "{", "null", "[" * 100_000, '{"id": "fig_1"}'])
 def test_what_is_on_one_side_only(folders, content):
     record = folders[0] / "fig_1.json"
     record.unlink() if content is None else record.write_text(content)  # a damaged one is none

@@ -307,17 +307,27 @@ def _write(record: dict, *picture: bytes) -> None:
 
 def read_records(folder: Path) -> dict[str, dict]:
     """All records by id, in the order of a reader: S2 before S10. A damaged one is none."""
-
-    def order(path: Path) -> list:
-        return [int(p) if p.isdigit() else p for p in re.split(r"(\d+)", path.stem)]
-
     found = {}
-    for path in sorted(folder.glob("*.json"), key=order):
+    for path in folder.glob("*.json"):
         with suppress(ValueError, RecursionError):
             record = json.loads(path.read_text("utf-8"))
-            if isinstance(record, dict) and record.get("id") == path.stem:
+            if _is_record(record, path.stem):
                 found[path.stem] = record
-    return found
+
+    def order(artifact_id: str) -> list:
+        return [int(p) if p.isdigit() else p for p in re.split(r"(\d+)", artifact_id)]
+
+    return {artifact_id: found[artifact_id] for artifact_id in sorted(found, key=order)}
+
+
+def _is_record(record: object, name: str) -> bool:
+    """Whether this is what `save_figure` and `save_table` write under a name."""
+    if not isinstance(record, dict) or record.get("id") != name:
+        return False
+    rows, numbers = record.get("rows"), record.get("numbers")
+    has_rows = isinstance(rows, list) and all(isinstance(row, dict) for row in rows)
+    said = isinstance(record.get("notebook"), str) and isinstance(record.get("caption"), str)
+    return said and record.get("kind") in PICTURES and (has_rows or isinstance(numbers, dict))
 
 
 def files_of(record: dict) -> list[str]:
