@@ -166,9 +166,15 @@ def test_all_pixels_tell_of_a_motion_where_there_are_no_corners():
     assert stands_still([views[0], sight(0, similar(0, 1e-6))]) is True
 
 
-@pytest.mark.parametrize(("flicker", "noise", "size"), [(0.03, 2, CLOUDY), (0, 12, VGA)])
-def test_a_camera_held_before_a_plain_wall_is_doubted(flicker, noise, size, tmp_path):
-    phone = Phone("plain", 20, (215, 30, 35), flicker, noise, False, False, "held", size, 40)
+@pytest.mark.parametrize(
+    "phone",
+    [
+        Phone("plain", flicker=0.03, camera="held", image_size=CLOUDY, frames=40),
+        Phone("plain", noise=12, camera="held", frames=40),
+        Phone("sky", noise=20, camera="trembling", frames=40),
+    ],
+)
+def test_a_camera_held_before_a_plain_wall_is_doubted(phone, tmp_path):
     write_phone(tmp_path / "clip.mp4", phone, 3)
     found = track(tmp_path / "clip.mp4")
     assert any("too plain to tell whether the camera moves" in doubt for doubt in found.warnings)

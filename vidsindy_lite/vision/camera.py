@@ -38,6 +38,7 @@ _STEP = 8.0  # pixels by which the guess may be wrong
 PARTS = 12  # into which each side of an image is cut: of one corner, and of one error, each
 LOOSE = 1.0  # pixels (reduced ones if it is to be used at all) to which a camera's motion is known
 _STILL = 0.25  # reduced pixels by which a corner at rest may seem to move
+_PLAINLY = 10  # standard errors from which on one pair of views tells a displacement
 _MANY = 60  # corners that need no other witness
 _CHANCE = 0.04  # gain (see `_gain`) above which it tells: those of mere noise are a tenth of it
 
@@ -262,33 +263,38 @@ def rescaled(maps: Floats, factor: float) -> Floats:
 
 
 def stands_still(samples: Iterable[Image]) -> bool | None:
-    """Does no pair of reduced samples, successive or far apart, show that the camera moves?
+    """Do pairs of reduced samples, successive or far apart, show that the camera does not move?
 
-    None if most pairs are too plain to tell.
+    None if many pairs are too plain or noisy to tell. Any motion is seen by two of the pairs, and a
+    tremble that is lost in the noise of each of them by its usual size.
     """
     looks = [Look(sample) for sample in samples]
     middle = looks[len(looks) // 2]
-    found = []
-    for before, after in [(looks[0], middle), (middle, looks[-1]), *pairwise(looks)]:
-        found.append(_moved(before, after))
-        if found[-1]:
-            return False
-    return True if 2 * found.count(None) < len(found) else None
+    pairs = [(looks[0], middle), (middle, looks[-1]), *pairwise(looks)]
+    found = np.array([_moved(before, after) for before, after in pairs])
+    told = found[np.isfinite(found)]
+    if np.sum(told > _PLAINLY) > 1:
+        return False
+    return bool(np.median(told) < 3.5) if len(told) > 0.75 * len(found) else None
 
 
-def _moved(before: Look, after: Look) -> bool | None:
-    """Does a view lie elsewhere, by more than its error, and clearly more corners than stay?"""
+def _moved(before: Look, after: Look) -> float:
+    """By how many of its standard errors a view lies elsewhere, none if most corners stay.
+
+    NaN if that cannot be told.
+    """
     rest = np.eye(3)
     found = _Key(before, rest, 0.0).locate(after, rest)
     if found is None:
-        return None
+        return np.nan
     a, b = before.follow(after, rest)
     stay, share = (
         np.sum(np.linalg.norm(carry(here, a) - b, axis=1) < _STILL) for here in (rest, found.map)
     )
     moved = displacement(found.map[None], before.grey.shape[::-1])[0]
-    # A displacement counts from ten of its standard errors on.
-    return bool(moved > max(10 * found.error, _STILL) and stay <= 0.7 * share)
+    stays = stay > max(0.7 * share, 0.1 * len(a))  # of corners of mere noise few do
+    errors = moved / found.error if moved > _STILL and not stays else 0.0
+    return errors if errors > _PLAINLY or 2 * found.error < LOOSE else np.nan
 
 
 def displacement(maps: Floats, size: Sequence[int]) -> Floats:
