@@ -208,9 +208,10 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     drowned = problem.noise.max() > 0.5  # a curve shows no accelerations
     body = order == "auto" and not (given or timed or drowned)
     body = body and accelerated(problem.curves) and not has_velocities(problem)
-    if body and whole:
+    swing = _swing(task, problem, places=False) if body and whole else None
+    if body and whole and not swing:
         linear = _of_forces(task, 1)  # no law of first order holds: its search would be in vain
-        if linear and not linear.warnings and not _swing(task, problem, places=False):
+        if linear and not linear.warnings:
             return replace(linear, note="order 2: velocities are no function of the place")
     found, problem, fit = _solved(task, problems, probes)
     if given:
@@ -233,7 +234,7 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
             )
     if not found.warnings:
         return found
-    swing = _swing(task, problem, order == 2)
+    swing = swing or _swing(task, problem, order == 2)
     if swing or order == 2 or drowned:
         return replace(found, swing=swing)
     # With inputs a place is passed with several velocities, whatever the order is.
