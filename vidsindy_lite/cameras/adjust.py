@@ -274,23 +274,28 @@ class Adjustment:
 
     def _slopes(self) -> tuple[Floats, Floats]:
         """Slopes of the misses in the free changes, (n, 2 m, p), and in the points, (n, 2 m, 3)."""
-        free = np.argwhere(self.free)
-        in_change = np.zeros((*self.misses.shape, len(free)))
-        for k, (i, part) in enumerate(free):
-            columns = slice(2 * i, 2 * i + 2)
-            if part in (LAG, DRIFT):
-                in_change[:, columns, k] = self.footage.slopes(i)[int(part == DRIFT)]
-                continue
-            step = _PROBE * self.unit[i, part] * np.eye(SIZE)[part]
-            ends = [changed(self.start[i], self.change[i] + sign * step) for sign in (1, -1)]
-            high, low = (_missed(c, self.footage.aligned[i], self.points) for c in ends)
-            in_change[:, columns, k] = (high - low) / (2 * step[part])
         probe = _PROBE * self.reach
         in_points = np.stack([
             np.hstack([c.image(self.points - e) - c.image(self.points + e) for c in self.cameras])
             / (2 * probe)
             for e in probe * np.eye(3)
         ], axis=-1)  # fmt: skip
+        free = np.argwhere(self.free)
+        in_change = np.zeros((*self.misses.shape, len(free)))
+        for k, (i, part) in enumerate(free):
+            columns, camera = slice(2 * i, 2 * i + 2), self.start[i]
+            if part in (LAG, DRIFT):
+                in_change[:, columns, k] = self.footage.slopes(i)[int(part == DRIFT)]
+            elif part in PARTS["position"]:  # a camera moves as all points would the other way
+                axes = np.vstack((camera.rows, camera.normal))
+                in_change[:, columns, k] = (
+                    -in_points[:, columns] @ axes[part - PARTS["position"][0]]
+                )
+            else:
+                step = _PROBE * self.unit[i, part] * np.eye(SIZE)[part]
+                ends = [changed(camera, self.change[i] + sign * step) for sign in (1, -1)]
+                high, low = (_missed(c, self.footage.aligned[i], self.points) for c in ends)
+                in_change[:, columns, k] = (high - low) / (2 * step[part])
         return in_change, in_points
 
     @property

@@ -128,9 +128,10 @@ def rotation_to_z(normal: ArrayLike) -> Floats:
     """
     a, b, c = unit_vector("normal", normal)
     horizontal = np.hypot(a, b)
-    axis = (b / horizontal, -a / horizontal, 0.0) if horizontal > 0 else (1.0, 0.0, 0.0)
-    # arctan2 is accurate at every angle; arccos(c) loses half its digits near 0 and pi.
-    return rodrigues(axis, float(np.arctan2(horizontal, c)))
+    # The axis is (v, -u, 0); what follows is Eq. (2) of its angle, whose sine is `horizontal`.
+    u, v = (a / horizontal, b / horizontal) if horizontal > 0 else (0.0, 1.0)
+    k = 1 - c
+    return np.array([[1 - k * u * u, -k * u * v, -a], [-k * u * v, 1 - k * v * v, -b], [a, b, c]])
 
 
 def unit_vector(name: str, value: ArrayLike) -> Floats:
