@@ -124,12 +124,12 @@ save_table("table_S1", rows, caption="The seven systems; initial conditions in t
 
 # %%
 with TemporaryDirectory() as folder:
-    shot = film("Lorenz", folder, frames=300, seed=seed)
+    shot = film("Lorenz", folder, frames=150, seed=seed)
     seen = observe(shot.paths, shot.rig.uncalibrated(keep=0), shot.t, lags=(0, 0, 0))
 law = discover(seen.t, seen.x, systematic=seen.systematic, order=1)
 print(law.equations(), score(law, shot.truth), sep="\n\n")
 assert score(law, shot.truth).exact
-by_package = run_trial(Trial("Lorenz", trial=seed, source="sub-pixel", frames=300))
+by_package = run_trial(Trial("Lorenz", trial=seed, source="sub-pixel", frames=150))
 assert np.allclose(by_package.law.coefficients, law.system.coefficients, rtol=1e-6)
 
 # %% [markdown]
