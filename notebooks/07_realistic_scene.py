@@ -77,7 +77,7 @@ from vidsindy_lite.study import (
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
-frames = 400 if full else 250
+frames = 400 if full else 160
 trials = range(seed, seed + (5 if full else 1))
 
 # %% [markdown]

@@ -76,7 +76,7 @@ from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, plots, score
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
 names = ("Lorenz", "SprottE") if full else ("Lorenz",)
-frames = 1000 if full else 160
+frames = 1000 if full else 120
 late, fps = 7, 30
 
 

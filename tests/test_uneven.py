@@ -52,7 +52,7 @@ def test_tracks_by_their_own_clocks_give_the_path(motion):
 @pytest.mark.slow
 def test_the_law_of_a_phones_films_is_exact(motion, tmp_path):
     rng = np.random.default_rng(5)
-    clocks = [waver(rng, 300) for _ in range(3)]
+    clocks = [waver(rng, 200) for _ in range(3)]
     scene, paths = vl.Scene("sea", size=12, image_size=SIZE), []
     for i, track in enumerate(filmed(motion, clocks)):
         frames = render(track, scene, seed=i)

@@ -170,13 +170,17 @@ def test_lags_and_axes_of_motion(views, moving):
     assert found.lags.residual < 0.3
 
 
-@pytest.mark.parametrize("seed", [0, 2])
-def test_noise_makes_no_pinholes_of_parallel_views_and_no_fractions_of_whole_lags(seed):
-    lags = np.array([0.0, 2.0, -3.0])
-    tracks, rig = far_away(noise=2.0, count=150, seed=seed, lags=lags)
-    seen = vl.observe_tracks(tracks, rig, np.arange(150) / FPS)
-    assert "affine" in seen.rig.note
-    np.testing.assert_allclose(seen.lags.frames, lags, atol=0.2)
+def test_noise_makes_no_pinholes_of_parallel_views():
+    tracks, rig = far_away(noise=2.0, count=150, lags=[0.0, 2.0, -3.0])
+    assert "affine" in vl.observe_tracks(tracks, rig, np.arange(150) / FPS).rig.note
+
+
+@pytest.mark.parametrize("seed", range(4, 8))
+def test_noise_makes_no_fractions_of_whole_lags(seed):
+    tracks, rig = far_away(noise=2.0, count=150, seed=seed, lags=[0.0, 2.0, -3.0])
+    lags = factorised(Footage.of(tracks), rig).lags
+    assert (np.abs(lags.frames - [0.0, 2.0, -3.0]) <= 3 * lags.errors).all()
+    assert lags.errors.max() < 0.2
 
 
 def test_lags_that_others_fit_as_well_are_doubted():
