@@ -67,7 +67,7 @@ from vidsindy_lite.study import SAMPLES_PER_PERIOD, SYSTEMS, film, plots
 
 # %%
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
-frames, long = {"full": (300, 1500), "quick": (96, 400)}[profile]
+frames, long = {"full": (300, 1500), "quick": (72, 400)}[profile]
 folder = TemporaryDirectory()
 
 # %% [markdown]

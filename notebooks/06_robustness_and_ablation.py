@@ -84,7 +84,7 @@ plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
 systems = tuple(SYSTEMS) if full else ("SprottF",)
 methods = METHODS if full else (*METHODS[:3], METHODS[-1])  # without ensembles, which take long
-frames = 1500 if full else 150
+frames = 1500 if full else 200
 trials = range(seed, seed + (5 if full else 1))
 
 # %% [markdown]

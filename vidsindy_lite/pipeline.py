@@ -635,8 +635,7 @@ class VideoDiscovery(Observation):
     @property
     def period(self) -> Quantity | None:
         """Of small swings: of the coordinate or mode that moves most; None if nothing swings."""
-        law = self.discovery if self.swing is None else self.swing.law
-        said = [q for q in law.physics() if q.name.startswith("period")]
+        said = [q for q in self.discovery.physics() if q.name.startswith("period")]
         return min(said, key=lambda q: self._left_of(float(q.value)), default=None)
 
     def _left_of(self, period: float) -> float:

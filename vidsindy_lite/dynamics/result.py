@@ -378,6 +378,8 @@ class Discovery:
     def physics(self, down: ArrayLike | None = None) -> Physics:
         """What a law of motion says of a body: g and drag, or springs and periods; its energy.
 
+        Of a body on a circle, see `swing`, that of its angle.
+
         Parameters
         ----------
         down : array_like, shape (m,), optional
@@ -395,6 +397,8 @@ class Discovery:
         ValueError
             If ``down`` is no direction.
         """
+        if self.swing is not None:
+            return self.swing.law.physics()
         return physics_of(self.system, self.covariance, self.curves, down)
 
     def plot_path(self) -> Figure:
@@ -484,15 +488,15 @@ class Discovery:
 
     def statement(self) -> str:
         """The law as text, and what was found out beside it: all but the warnings."""
-        lines = [self.equations()]
+        lines, said = [self.equations()], self.physics().headline
         if self.swing is not None:
-            lines = [str(self.swing), "a law of its positions, one of many that fit alike:", *lines]
+            positions = "a law of its positions, one of many that fit alike:"
+            lines, said = [str(self.swing), said, positions, *lines], ""
         if self.model_error.any():
             sizes = zip(self.model_error, self.system.names, strict=True)
             noise = ", ".join(f"{size:.2g} in {name}" for size, name in sizes if size)
             lines.append(f"process noise: {noise} over a unit of time")
-        if said := self.physics().headline:
-            lines.append(said)
+        lines.append(said)
         if terms := list(unseen(self.native, self.offset, self.curves, self.absent)):
             frame = "in its own frame, " if self.offset.any() else ""
             more = f" and {len(terms) - 3} more" if len(terms) > 3 else ""
@@ -504,7 +508,7 @@ class Discovery:
             lines.append(f"axes: {self.axes}; the error bars hold theirs")
         if self.note:
             lines.append(f"note: {self.note}")
-        return "\n".join(lines)
+        return "\n".join(filter(None, lines))
 
     def __str__(self) -> str:
         return "\n".join([self.statement(), *(f"warning: {text}" for text in self.warnings)])
