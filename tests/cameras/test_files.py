@@ -38,16 +38,13 @@ def rooms(seed, dist=True):
     return parts
 
 
-def seen(part):
-    turned = cv2.Rodrigues(part["R"])[0]
-    return cv2.projectPoints(POINTS, turned, part["t"], part["K"], part["dist"])[0][:, 0]
-
-
 def assert_same(rig, parts):
     assert len(rig.cameras) == len(parts)
     for camera, part in zip(rig.cameras, parts, strict=True):
         assert camera.image_size == SIZE
-        np.testing.assert_allclose(camera.project(POINTS), seen(part), rtol=0, atol=1e-9)
+        turned, *others = cv2.Rodrigues(part["R"])[0], part["t"], part["K"], part["dist"]
+        seen = cv2.projectPoints(POINTS, turned, *others)[0][:, 0]
+        np.testing.assert_allclose(camera.project(POINTS), seen, rtol=0, atol=1e-9)
 
 
 def toml(parts, head="cam_{}", matrix=False):

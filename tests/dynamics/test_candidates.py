@@ -34,11 +34,9 @@ def test_a_pendulum_at_a_large_amplitude_is_found_from_its_angle_alone(friction,
     assert found.status == "ok"
 
 
-def speed(vx, vy, vz):
-    return np.sqrt(vx**2 + vy**2 + vz**2)
-
-
-DRAG = Library.terms({"|v|v": lambda vx, vy, vz: speed(vx, vy, vz) * np.array([vx, vy, vz])})
+DRAG = Library.terms(
+    {"|v|v": lambda vx, vy, vz: np.sqrt(vx**2 + vy**2 + vz**2) * np.array([vx, vy, vz])}
+)
 
 
 def thrown(noise=0.01):

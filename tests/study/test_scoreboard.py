@@ -149,15 +149,11 @@ def test_bad_contests_benchmarks_and_times_are_refused(make, message):
         make()
 
 
-def allee(x):
-    return 0.14 * x * (1 - x / 130) * (x / 4.4 - 1)
-
-
 @pytest.mark.parametrize(
     ("number", "start", "rate"),
     [
         (3, (6.1,), lambda x: (0.79 * x * (1 - x / 74.3),)),
-        (8, (6.123,), lambda x: (allee(x),)),
+        (8, (6.123,), lambda x: (0.14 * x * (1 - x / 130) * (x / 4.4 - 1),)),
         (33, (5.0, 0.7), lambda x, y: (-np.sin(y) - 0.08 * x**2, x - np.cos(y) / x)),
         (56, (2.3, 8.1, 12.4), lambda x, y, z: (10 * (y - x), x * (28 - z) - y, x * y - 8 / 3 * z)),
     ],

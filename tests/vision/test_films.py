@@ -369,6 +369,13 @@ def test_the_toss():
     assert (error[shown] < 1).mean() >= 0.9
 
 
+@pytest.mark.thorough
+def test_the_green_ball_before_a_hand_held_phone():
+    found = track(real("pendulum"))
+    assert np.isfinite(found.pixels).all(axis=1).mean() > 0.8
+    assert not any("followed by its looks alone" in doubt for doubt in found.warnings)
+
+
 # -------------------------------------------------------------------------------------------- hints
 
 
