@@ -113,9 +113,6 @@ def test_a_law_with_what_is_known_is_found_and_its_errors_are_smaller():
     assert told.equations().startswith("dx/dt = 2 y\ndy/dt = - (")
 
 
-# --------------------------------------------------------------------------------- origin
-
-
 def test_with_the_origin_of_the_data_no_axis_moves():
     shifted = noisy() + (5.0, 0.0)
     assert vl.discover(T, shifted, degree=2).offset[0] == pytest.approx(5, abs=0.1)
@@ -123,9 +120,6 @@ def test_with_the_origin_of_the_data_no_axis_moves():
     assert not found.offset.any()
     assert (found.native.coefficients == found.coefficients).all()
     assert (found.system.support == SPRING.shift((5, 0)).support).all()
-
-
-# ---------------------------------------------------------------------------------- sigma
 
 
 def test_error_bars_of_given_errors_cover():

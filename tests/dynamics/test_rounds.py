@@ -159,6 +159,7 @@ def test_the_swing_is_printed_and_kept(swung, tmp_path):
     assert "angle'' = " in first
     place = others.index("a law of its positions, one of many that fit alike:")
     assert others[place + 1] == swung.equations().splitlines()[0]
+    assert others[place - 1] == f"of small swings: {swung.physics()['period']}"
     swung.save(tmp_path / "law.json")
     kept = vl.Discovery.load(tmp_path / "law.json").swing
     assert str(kept) == str(swung.swing)
