@@ -99,8 +99,14 @@ save_figure("figure_S1", fig, caption=caption, numbers={"t": t, "x": x})
 # scipy's rotation vectors are an independent implementation to compare with.
 
 # %%
+def rotation_about(axis, angle):
+    u = axis / np.linalg.norm(axis)
+    U = np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
+    return np.eye(3) + np.sin(angle) * U + (1 - np.cos(angle)) * U @ U
+
+
 axis, angle = np.array([1.0, 2.0, 2.0]) / 3, 0.7
-R = cameras.rodrigues(axis, angle)
+R = rotation_about(axis, angle)
 assert np.allclose(R, Rotation.from_rotvec(angle * axis).as_matrix(), atol=1e-12)
 R.round(6)
 
@@ -160,7 +166,7 @@ print("axis as written:", axis)
 # %%
 def as_written(normal):
     axis = np.cross(normal, e_z)
-    return cameras.rodrigues(axis, np.arccos(normal @ e_z))
+    return rotation_about(axis, np.arccos(normal @ e_z))
 
 
 def bound(rotation, exponent):
@@ -365,7 +371,7 @@ middle, half = (x.min(axis=0) + x.max(axis=0)) / 2, (np.array(camera.image_size)
 
 
 def walked(degrees):
-    turn = cameras.rodrigues(e_z, np.deg2rad(degrees))
+    turn = rotation_about(e_z, np.deg2rad(degrees))
     place = middle + turn @ (camera.position - middle)
     rolling = replace(camera, position=place, normal=turn @ camera.normal, scale=1.2 * camera.scale)
     return replace(rolling, angle=camera.angle - np.deg2rad(degrees)), rolling

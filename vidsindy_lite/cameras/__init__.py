@@ -18,8 +18,7 @@ from .adjust import explain, smooth
 from .calibrate import calibration_errors, check_learnable, learn_cameras, learn_cameras_eq4
 from .calibrate import systematic_errors, tracking_errors
 from .clocks import Clock, Footage, Lags, align, list_lags
-from .models import AffineCamera, Camera, OrthographicCamera, PerspectiveCamera
-from .models import rodrigues, rotation_to_z
+from .models import AffineCamera, Camera, OrthographicCamera, PerspectiveCamera, rotation_to_z
 from .rig import BETTER, DISAGREEMENT, GROSS, Rig, disagreement, paced, read_calibration
 from .rig import reconstruct, residuals, rig_template, without_view_outliers
 from .synchronise import find_mistake, learn_lags

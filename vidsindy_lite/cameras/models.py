@@ -54,7 +54,6 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
-from scipy.spatial.transform import Rotation
 
 from ..arrays import Bools, Floats
 from ..checks import (
@@ -77,31 +76,6 @@ TRIMMED = 0.9  #: Share of the instants that must agree; the others may hold any
 _STEPS = 30  # of Newton, from the linear solution: four or five are usual
 _LARGEST = 0.49  # frames; so instants never overtake each other, whatever an outlier says
 _DOWN = np.array([1.0, -1.0])  # the lens's y is down, the ideal image's up
-
-
-def rodrigues(axis: ArrayLike, angle: float) -> Floats:
-    """Rotation by an angle about an axis, by Rodrigues' formula.
-
-    Paper: Eq. (1)-(2), R = I + sin(angle) U + (1 - cos(angle)) U^2, where U w = u x w.
-
-    Parameters
-    ----------
-    axis : array_like, shape (3,)
-        Rotation axis u; need not have unit length, must not be zero.
-    angle : float
-        Rotation angle in radians, right-handed about the axis.
-
-    Returns
-    -------
-    ndarray, shape (3, 3)
-
-    Raises
-    ------
-    ValueError
-        If the axis is not a finite non-zero vector of shape (3,), or the angle is not finite.
-    """
-    turn = check_number("angle", angle) * unit_vector("axis", axis)
-    return Rotation.from_rotvec(turn).as_matrix()
 
 
 def rotation_to_z(normal: ArrayLike) -> Floats:

@@ -344,13 +344,14 @@ class _Key(NamedTuple):
             return told
         direct = align(self.look, look, last)
         # A map that is known to three reduced pixels, no better, is not known.
-        both = [one for one in (told, direct) if one is not None and one.error < 3.0]
-        best = min((one.error for one in both), default=0.0)
+        known = [one for one in (told, direct) if one is not None and one.error < 3.0]
+        least = min((one.error for one in known), default=0.0)
         # Times the error of another map that is about as good; then the smaller step is taken.
-        good = [one for one in both if one.error <= 3.0 * best]
+        good = [one for one in known if one.error <= 3.0 * least]
         size, back = self.look.grey.shape[::-1], np.linalg.inv(last)
-        steps = [displacement((one.map @ back)[None], size)[0] for one in good]
-        return good[int(np.argmin(steps))] if good else None
+        return min(
+            good, key=lambda one: displacement((one.map @ back)[None], size)[0], default=None
+        )
 
     def shared(self, here: Floats) -> float:
         """Share of it that is in the view of the frame in which it lies here."""
