@@ -173,7 +173,7 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
         looks = Looks(np.full((n, 4), np.nan), np.zeros(n), np.ones(len(seen.frame)))
     else:
         looks = followed(film.frames, film.maps[:n], seen, start)
-    both = _together(seen, looks, film.maps, start.frame, told=seed is not None, moves=bool(paths))
+    both = _together(seen, looks, film.maps, start.frame, told=seed is not None)
     rows, _ = best_path(both, away=True)
     if len(rows) < _SHORTEST:
         return nothing(film.motion, n, film.doubts)
@@ -316,12 +316,11 @@ def _staying(centre: Floats, size: Floats) -> float:
 
 
 def _together(
-    seen: Candidates, looks: Looks, maps: Floats, first: int, *, told: bool, moves: bool
+    seen: Candidates, looks: Looks, maps: Floats, first: int, *, told: bool
 ) -> Candidates:
     """Candidates of both kinds: what differs, worth what its colours say, and what looks alike.
 
-    `told` is whether somebody says where it is, in the frame `first`; `moves`, whether some path of
-    what differs is it.
+    `told` is whether somebody says where it is, in the frame `first`.
     """
     quality = seen.quality * (0.25 + 0.75 * looks.like)
     at = np.flatnonzero(np.isfinite(looks.box[:, 0]))
@@ -331,7 +330,7 @@ def _together(
     colour[:] = np.median(seen.colour, axis=0) if len(seen.colour) else 0
     for k, i in enumerate(at.tolist()):
         there = _there(seen, i, centre[k], area[k])
-        if moves and not len(there):  # what does not differ from the ground is hardly the target
+        if not len(there):  # what does not differ from the ground is hardly the target
             worth[k] *= 0.5
         near = there[np.abs(np.log(seen.area[there] / area[k])) < 0.8]
         if len(near):
