@@ -314,8 +314,7 @@ distance = {
     "X'OY' (depth)": signed_distance(C, origin, X, Y),
 }
 assert np.allclose(list(distance.values())[:2], camera.offset, atol=1e-12)
-behind = signed_distance(-C, origin, Y, Z)  # on its other side
-assert np.isclose(behind, -distance["Y'OZ' (delta_x)"])
+assert not np.allclose(np.abs(list(distance.values())[:2]), camera.offset)  # signs count
 
 # %%
 rows = [
@@ -367,7 +366,7 @@ print("pixels from", pixels.min(axis=0).round(1), "to", pixels.max(axis=0).round
 # which keeps z up. In the right one it stays: as $\mathbf R$ turns the axes of the plane along, the image rolls.
 
 # %%
-middle, half = (x.min(axis=0) + x.max(axis=0)) / 2, (np.array(camera.image_size) - 1) / 2
+middle = (x.min(axis=0) + x.max(axis=0)) / 2
 
 
 def walked(degrees):
@@ -378,15 +377,17 @@ def walked(degrees):
 
 
 # %%
-figures, seen = {}, {}
+figures, seen, up = {}, {}, {}
 for degrees in range(0, 360, 30):
     pair = walked(degrees)
     seen[degrees] = [one.project(x[:500]) for one in pair]
-    upright, rolled = (np.linalg.norm(image - half, axis=1) for image in seen[degrees])
-    assert np.allclose(upright, rolled, atol=1e-6)  # the same image, turned
+    (u, v), (u_2, v_2) = (np.diff(one.project([middle, middle + e_z]), axis=0)[0] for one in pair)
+    up[degrees] = np.arctan2(v, u), np.arctan2(v_2, u_2)  # where z is in the images
     fig = figures[f"{degrees} degrees"] = plots.plot_tracks(seen[degrees], pair)
     for axes, title in zip(fig.axes, ("angle turned back", "angle as it was"), strict=True):
         axes.set_title(title)
+upright, rolling = np.unwrap(list(up.values()), axis=0).T
+assert np.ptp(upright) < 1e-9 < 5 < np.ptp(rolling)
 caption = "The image of a camera that walks around: upright (left), and rolling with the axes of the plane (right)."
 save_slider("projection_walk", figures, caption=caption, numbers={"degrees": list(seen), "first": seen[0]})
 
@@ -408,7 +409,7 @@ save_slider("projection_walk", figures, caption=caption, numbers={"degrees": lis
 #   <!-- by: not np.allclose(text @ n, e_z; abs(coefficient_of_d(np.cross(n, e_z))) < 1e-12 -->
 # * The matrix of the proof has a wrong sign in row 2, column 3; the axis is $0/0$ along z; and the
 #   offset needs *signed* distances to Y'OZ' and X'OZ'.
-#   <!-- by: abs(np.linalg.det(proof) - 1) > 1e-3; np.isnan(axis).all(); np.isclose(behind, -distance; figure projection_offset -->
+#   <!-- by: abs(np.linalg.det(proof) - 1) > 1e-3; np.isnan(axis).all(); np.allclose(list(distance.values())[:2], camera.offset; np.abs(list(distance.values())[:2]); figure projection_offset -->
 #
 # Next: [videos and tracking](02_videos_and_tracking.ipynb), where pixels come from images, and
 # [camera learning](03_camera_learning.ipynb), where $s$ and $\vartheta$ come from pixels.

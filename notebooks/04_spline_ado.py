@@ -435,6 +435,7 @@ print(f"smooth across the gap: off by {off(smooth(t[lost]), clean[lost]):.2f} of
       f"along the law: {off(by_hand, clean[lost]):.3f}; to both sides: {off(inside, clean[lost]):.3f}")  # fmt: skip
 assert off(smooth(t[lost]), clean[lost]) > 0.5
 assert off(by_hand, inside) < 0.03
+assert off(inside, clean[lost]) < 0.1
 
 # %%
 near = slice(100, 300)
@@ -685,7 +686,7 @@ save_slider("solver_weight_slider", {name: fig for name, (fig, _) in pairs.items
 #   remains, the Schur complement, is the information about the law.
 #   <!-- by: np.abs(row - column).max() == 11; figure solver_step; np.allclose(schur, information -->
 # * Samples may be missing: what is lost is their number, as the law carries the curve across.
-#   <!-- by: off(smooth(t[lost]), clean[lost]) > 0.5; off(by_hand, inside) < 0.03 -->
+#   <!-- by: off(smooth(t[lost]), clean[lost]) > 0.5; off(by_hand, inside) < 0.03; off(inside, clean[lost]) < 0.1 -->
 #
 # ## What the paper says, and what we found
 #

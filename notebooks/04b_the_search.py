@@ -202,7 +202,7 @@ def draw(stream):
 draws = [draw(stream) for stream in np.random.SeedSequence(seed).spawn(8)]
 shares = {way: np.mean([one[way] for one in draws]) for way in draws[0]}
 print("\n".join(f"{way}: {share:.0%}" for way, share in shares.items()))
-assert max(shares.values()) == shares["the search"]
+assert all(share < shares["the search"] - 0.3 for way, share in shares.items() if way != "the search")
 
 # %% [markdown]
 # One step of the search takes a few lines, too: of all single drops, adds and swaps, take the one after which loss and
@@ -230,7 +230,7 @@ assert np.isclose(priced(whole) - priced(step(whole)), penalty[weakest] - z[weak
 assert (step(support) == support).all()  # where the package's search has ended, no step pays
 
 # %% [markdown]
-# How sure is the search? `closest_rival` is the single change that costs least, in the units of the loss: squared
+# How sure is the search? `closest_rival` is the law that costs least if one term is forced in or out, in the units of the loss: squared
 # misfits over the variance of the noise, so that a term is worth its penalty if it lowers the loss by more.
 
 # %%
@@ -726,6 +726,7 @@ def pendulum(noise):
 rows = [pendulum(noise) for noise in ((0.01, 0.05, 0.2) if full else (0.05,))]
 caption = "A pendulum that swings nearly round: no polynomial is right, yet some fit."
 assert all(row["status"] == "suspect" or row["data loss"] < 1.1 for row in rows)
+assert not full or any(row["status"] == "ok" for row in rows)  # and wrong
 save_table("solver_pendulum", rows, caption=caption)
 
 # %% [markdown]
@@ -738,14 +739,14 @@ save_table("solver_pendulum", rows, caption=caption)
 #   <!-- by: (step(support) == support).all(); count(*offset[:2]) < counts.min() + 1; covered > 0.85 -->
 # * Terms have to be weighed against each other, all others refitted. Size alone tells little, significance in
 #   an unpruned fit not enough.
-#   <!-- by: max(shares.values()) == shares["the search"]; (step(support) == support).all() -->
+#   <!-- by: share < shares["the search"] - 0.3; (step(support) == support).all() -->
 # * Errors that are smooth look like terms. Those that stay while more error is tolerated are the law.
 #   <!-- by: score(persistent.native, native).exact; figure solver_path -->
 # * Estimates are as close as the Cramér-Rao bound allows, and the error bars say so.
 #   <!-- by: np.sqrt(np.mean(ratio**2)) < 1.5; covered > 0.85 -->
 # * A warning is a reason to doubt; that there is none proves nothing: what fits to within the noise cannot be
 #   told from the truth on the same data.
-#   <!-- by: silent <= len(wrong) / 2; row["status"] == "suspect" or row["data loss"] < 1.1 -->
+#   <!-- by: any(row["status"] == "ok" for row in rows); row["status"] == "suspect" or row["data loss"] < 1.1 -->
 #
 # ## What the paper says, and what we found
 #

@@ -189,7 +189,9 @@ with np.errstate(invalid="ignore"):
     axis = np.cross(e_z, e_z) / np.linalg.norm(np.cross(e_z, e_z))
 assert np.isnan(axis).all()
 offsets = np.array([camera.offset for camera in rig.cameras])
-signed = np.array([cameras.rotation_to_z(c.normal) @ c.position for c in rig.cameras])
+turned = [cameras.rotation_to_z(c.normal) for c in rig.cameras]  # axes X', Y', Z'
+planes = [np.cross(np.roll(axes, -1, axis=0), np.roll(axes, -2, axis=0)) for axes in turned]
+signed = np.array([plane @ c.position for plane, c in zip(planes, rig.cameras, strict=True)])
 assert np.allclose(signed[:, :2], offsets, atol=1e-12)
 assert not np.allclose(np.abs(signed[:, [1, 2]]), np.abs(offsets), atol=1)
 

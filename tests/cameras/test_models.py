@@ -207,6 +207,17 @@ def test_agrees_with_opencv(seed):
     assert pickle.loads(pickle.dumps(camera)) == camera  # though it is used
 
 
+def test_the_lens_is_that_of_brown():
+    rng = np.random.default_rng(0)
+    (x, y), (k1, k2, p1, p2, k3) = rng.uniform(-0.5, 0.5, (2, 40)), rng.normal(0, 0.05, 5)
+    r2 = x**2 + y**2
+    radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
+    u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x**2)
+    v = y * radial + p1 * (r2 + 2 * y**2) + 2 * p2 * x * y
+    seen = distorted(np.column_stack([x, y]), np.array([k1, k2, p1, p2, k3]))
+    np.testing.assert_allclose(seen, np.column_stack([u, v]), atol=1e-12)
+
+
 @pytest.mark.parametrize(("power", "which"), [(1, 0), (2, 1), (3, 4)])
 def test_every_power_of_the_radius_folds_where_its_image_is_largest(power, which):
     # With k = -1/(2p + 1) the image of the radius r is r + k r^(2p + 1), largest at r = 1.

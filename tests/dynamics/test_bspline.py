@@ -16,16 +16,15 @@ from vidsindy_lite.dynamics.l0 import closest_rival, inverse, subset_search
 from vidsindy_lite.dynamics.library import monomial_exponents
 
 
-@given(st.integers(2, 15), st.integers(0, 2), st.integers(0, 1000))
-def test_agrees_with_scipy(count, order, seed):
+@given(st.integers(2, 15), st.integers(1, 2), st.integers(0, 1000))
+def test_derivatives_agree_with_scipy(count, order, seed):
     rng = np.random.default_rng(seed)
     breakpoints = np.cumsum(rng.uniform(0.1, 2, count))
     knots = clamped_knots(breakpoints)
     t = np.sort(np.concatenate([breakpoints, rng.uniform(breakpoints[0], breakpoints[-1], 20)]))
     control = rng.normal(size=len(knots) - 4)
     ours = design_matrix(knots, t, order) @ control
-    scipys = BSpline(knots, control, 3)
-    theirs = scipys.derivative(order)(t) if order else scipys(t)
+    theirs = BSpline(knots, control, 3).derivative(order)(t)
     inside = ~np.isin(t, breakpoints) if order == 2 else np.ones(len(t), dtype=bool)
     np.testing.assert_allclose(ours[inside], theirs[inside], atol=1e-9 * (1 + abs(theirs).max()))
 
