@@ -604,8 +604,12 @@ def followed(frames: Reel, maps: Floats, found: Candidates, seed: Spot) -> Looks
             speed = (now[1] - before[1]) / max(abs(now[0] - before[0]), 1)
             ahead = carry(np.linalg.inv(maps[i]), (now[1] + speed * min(gap, 8))[None])[0]
             near = _near(found.only(here), like[here], ahead, size, gap)
+            tries: list[Floats] = []
+            for one in [ahead, *near]:
+                if not any(np.linalg.norm(one - other) < size.min() / 4 for other in tries):
+                    tries.append(one)
             views = []
-            for place, answer, colour in (looks.find(frame, one, size) for one in [ahead, *near]):
+            for place, answer, colour in (looks.find(frame, centre, size) for centre in tries):
                 apart = np.linalg.norm(place - ahead) / (size.max() + 8)
                 moved = any(np.linalg.norm(place - one) < size.min() / 2 for one in near)
                 score = 0.7 * answer + 0.3 * colour + 0.25 * moved - 0.1 * apart
