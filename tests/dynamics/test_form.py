@@ -22,9 +22,6 @@ def form(library, order=1):
     return Form.of(("x", "y"), library, order)
 
 
-# ---------------------------------------------------------------------------------- terms
-
-
 def test_terms_are_known_forbidden_or_alone_allowed():
     library = QUADRATIC.where({"x": {"y": 2, "x^2": 0}, "y": {"x": None, "y": None, "...": 0}})
     posed = form(library)
@@ -139,9 +136,6 @@ def test_error_bars_of_given_errors_cover():
 def test_errors_that_contradict_the_data_are_doubted(factor, words):
     found = vl.discover(T, noisy(0.05), degree=2, sigma=factor * 0.05)
     assert any(words in warning for warning in found.warnings)
-
-
-# ---------------------------------------------------------------------------------- names
 
 
 def frame(*names):
