@@ -275,6 +275,8 @@ def stands_still(samples: Iterable[Image]) -> bool | None:
     told = found[np.isfinite(found)]
     if np.sum(told > _PLAINLY) > 1:
         return False
+    # The usual one is 1 to 3 of a camera at rest, more than 1 by compression. What few pairs tell,
+    # before a plain wall, may be the target's motion.
     return bool(np.median(told) < 3.5) if len(told) > 0.75 * len(found) else None
 
 
