@@ -335,6 +335,11 @@ fig = plot_collocation(**curves, **checks)
 caption = "The law pulls the curve off the noise; it holds exactly at the collocation nodes."
 save_figure("solver_curve", fig, caption=caption, numbers=samples | curves | checks)
 
+# %%
+closer = [np.sqrt(np.mean((curve(t) - clean) ** 2)) for curve in (first, spline)]
+print("off the clean path, rms: smoothing spline {:.3g}, curve that obeys the law {:.3g}".format(*closer))
+assert level == 0 or closer[1] < 0.7 * closer[0]
+
 
 # %% [markdown]
 # *Above: a spline that is only smooth (dashed) follows the noise, one that has to obey a law (blue) does
@@ -681,7 +686,7 @@ save_slider("solver_weight_slider", {name: fig for name, (fig, _) in pairs.items
 # ## What we learned
 #
 # * Curve and law are fitted together: the law is the best smoother there is, if it is the right one.
-#   <!-- by: score(found, truth).exact; np.abs(unmet(nodes)).max(); figure solver_curve -->
+#   <!-- by: score(found, truth).exact; closer[1] < 0.7 * closer[0]; np.abs(unmet(nodes)).max(); figure solver_curve -->
 # * The normal matrix is banded in the curve, so its size grows as the number of samples and not as the square of it; what
 #   remains, the Schur complement, is the information about the law.
 #   <!-- by: np.abs(row - column).max() == 11; figure solver_step; np.allclose(schur, information -->
