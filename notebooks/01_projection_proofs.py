@@ -314,7 +314,7 @@ distance = {
     "X'OY' (depth)": signed_distance(C, origin, X, Y),
 }
 assert np.allclose(list(distance.values())[:2], camera.offset, atol=1e-12)
-assert min(one.offset.min() for one in rig.cameras) < 0  # no distance is: signs count
+assert min(one.offset.min() for one in Rig.around(x).cameras) < 0  # no distance is: signs count
 
 # %%
 rows = [
@@ -409,7 +409,7 @@ save_slider("projection_walk", figures, caption=caption, numbers={"degrees": lis
 #   <!-- by: not np.allclose(text @ n, e_z; abs(coefficient_of_d(np.cross(n, e_z))) < 1e-12 -->
 # * The matrix of the proof has a wrong sign in row 2, column 3; the axis is $0/0$ along z; and the
 #   offset needs *signed* distances to Y'OZ' and X'OZ'.
-#   <!-- by: abs(np.linalg.det(proof) - 1) > 1e-3; np.isnan(axis).all(); np.allclose(list(distance.values())[:2], camera.offset; min(one.offset.min() for one in rig.cameras) < 0; figure projection_offset -->
+#   <!-- by: abs(np.linalg.det(proof) - 1) > 1e-3; np.isnan(axis).all(); np.allclose(list(distance.values())[:2], camera.offset; min(one.offset.min() for one in Rig.around(x).cameras) < 0; figure projection_offset -->
 #
 # Next: [videos and tracking](02_videos_and_tracking.ipynb), where pixels come from images, and
 # [camera learning](03_camera_learning.ipynb), where $s$ and $\vartheta$ come from pixels.
