@@ -287,10 +287,8 @@ class Adjustment:
             if part in (LAG, DRIFT):
                 in_change[:, columns, k] = self.footage.slopes(i)[int(part == DRIFT)]
             elif part in PARTS["position"]:  # a camera moves as all points would the other way
-                axes = np.vstack((camera.rows, camera.normal))
-                in_change[:, columns, k] = (
-                    -in_points[:, columns] @ axes[part - PARTS["position"][0]]
-                )
+                axis = np.vstack((camera.rows, camera.normal))[PARTS["position"].index(part)]
+                in_change[:, columns, k] = -in_points[:, columns] @ axis
             else:
                 step = _PROBE * self.unit[i, part] * np.eye(SIZE)[part]
                 ends = [changed(camera, self.change[i] + sign * step) for sign in (1, -1)]
