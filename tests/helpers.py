@@ -143,9 +143,6 @@ def filmed(motion, frames, lags, rates=(1, 1, 1), noise=0.05):
     return tracks
 
 
-HAND = {"normal_error": 2.0, "position_error": 0.03, "scale_error": 0.03}
-
-
 def walk(t):
     """A path in a room, metres, that never repeats itself; t in frames of a video."""
     t = np.asarray(t)[:, None] / 40
@@ -162,12 +159,12 @@ def room(rng, cameras=3, **lens):
         views.append(
             vl.PerspectiveCamera(
                 position=rng.uniform(2, 4) * away / np.linalg.norm(away),
-                normal=away + 0.03 * rng.normal(size=3),
                 scale=1 / 1109,
+                normal=away + 0.03 * rng.normal(size=3),
                 angle=rng.uniform(-np.pi, np.pi),
                 image_size=(1280, 720),
                 **lens,
-            )
+            )  # fmt: skip
         )
     return vl.Rig(views)
 
@@ -204,7 +201,7 @@ def by_hand(rng, rig, **more):
             position=c.position + 0.03 * rng.normal(size=3),
             scale=c.scale * np.exp(0.03 * rng.normal()),
             angle=c.angle + np.deg2rad(2) * rng.normal(),
-            **HAND | more,
+            **{"normal_error": 2.0, "position_error": 0.03, "scale_error": 0.03} | more,
         )
         for c in rig.cameras
     )

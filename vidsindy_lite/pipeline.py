@@ -838,7 +838,7 @@ def times_of(
     if fps is None:
         if len(stated) < len(read):
             name = next(track.name for track in read if track.t is None)
-            raise ValueError(f"t: must be given, or fps, as {name} states no times")
+            raise ValueError(f"fps: must be given, or t, as {name} states no times")
         return [times for _, times in stated], []
     given = check_positive("fps", fps)
     rates = [(name, 1 / np.median(np.diff(times))) for name, times in stated if len(times) > 1]

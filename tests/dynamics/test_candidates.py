@@ -158,6 +158,7 @@ def test_a_sum_is_a_union():
         (Library.polynomial(60), r"library: must have at most 1000 terms, got 1891 in 2"),
         (Library.terms({"a": max}), r"arguments of 'a' must be named .* got none"),
         (Library.terms({"x": lambda x: x**2}), "a term must have a name of its own, got 'x' twice"),
+        (Library.polynomial(1) + Library.terms({"1": lambda x: x**2}), "of its own, got '1' twice"),
         (Library.terms({"s": lambda x: math.sin(x)}), "'s' must take and return arrays .* Type"),
         (Library.terms({"a": lambda x: 1.0}), r"'a' must return an array of the shape"),
         (

@@ -72,6 +72,9 @@ def test_functions_of_the_time_may_multiply_the_state():
     library += Library.terms({"hx": lambda h, x: h * x})
     same = vl.discover(T, noisy(x, 0.01), library=library, order=2)
     np.testing.assert_allclose(same.coefficients, found.coefficients, rtol=1e-3, atol=1e-3)
+    assert all("changes with the time" in str(law.physics()) for law in (found, same))
+    with pytest.raises(ValueError, match="t: must lie where h is known, got 4"):
+        same.simulate((1, 0), [0, 10, 42])  # though it stands in a product alone
 
 
 def test_each_trajectory_has_its_input_and_a_gap_is_bridged():
@@ -121,6 +124,8 @@ def test_a_law_with_an_input_is_saved_and_read_with_its_library(forced, tmp_path
     assert ("changes with the time" in str(said), said.energy) == (True, ())
     with pytest.raises(ValueError, match="library: must hold the function 'u'"):
         Discovery.load(tmp_path / "law.json")
+    with pytest.raises(ValueError, match="library: must be of type Library, got 'polynomial"):
+        Discovery.load(tmp_path / "law.json", "polynomial(3)")
     with pytest.raises(ValueError, match="t: must lie where u is known, got 4"):
         forced.simulate((0, 0), np.linspace(30, 42, 5))
 
@@ -173,6 +178,9 @@ def test_where_an_input_jumps_so_does_the_slope(known, noise):
     off = law.coefficients[rows, 0] - (-0.8, 2.0)
     assert (np.abs(off) < 4 * found.standard_errors[rows, 0]).all()
     assert noise or np.abs(off).max() < 1e-5
+    if not noise:  # a pulse between the times that are asked for
+        ahead = found.simulate([0.0], [0.0, 11.0]).x[1, 0]
+        assert ahead == pytest.approx(charged()[110, 0], abs=1e-4)
 
 
 def test_nothing_is_made_of_the_time_in_which_an_input_jumped():
@@ -220,6 +228,7 @@ def test_runs_that_begin_where_an_input_jumps():
 def test_samples_that_jump_are_held_and_that_is_told():
     with pytest.warns(UserWarning, match="inputs: u jumps, as at t = 5, .*hold='zero'"):
         told = Input.of("u", CLOCK, relay(CLOCK))
+    assert len(Input.of("u", CLOCK, np.full(len(CLOCK), 0.3)).unsure) == 0  # without a word
     s = np.arange(0.05, 39, 0.1)
     np.testing.assert_array_equal(told(s), relay(s))
     for hold in ("linear", "cubic"):  # who says so is not told

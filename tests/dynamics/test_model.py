@@ -30,9 +30,9 @@ def test_terms_are_read_in_any_usual_spelling():
         assert law.coefficients[law.terms.index("x^2y"), 0] == 2.0
         assert law.support.sum() == 1
     # Long names are kept apart.
-    law = PolynomialSystem.from_terms({"x10": {"x10 y": 1}, "y": {"y^2": -3}})
-    assert law.terms[-3:] == ("x10^2", "x10 y", "y^2")
-    assert "x_{10}" in law.latex()
+    law = PolynomialSystem.from_terms({"x10": {"x10 y_2": 1}, "y_2": {"y_2^2": -3}})
+    assert law.terms[-3:] == ("x10^2", "x10 y_2", "y_2^2")
+    assert r"\dot{x_{10}} &= x_{10} y_{2} \\" in law.latex()
 
 
 @pytest.mark.parametrize(

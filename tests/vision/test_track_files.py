@@ -181,6 +181,7 @@ def test_times_are_kept_and_trackers_world_is_not_taken_for_pixels(tmp_path):
         ("scorer,a,a,a\n0,1,2,.9\n", "must have rows scorer, bodyparts and coords"),
         ("pt1_cam1_X\n1\n2\n", "must have columns of both axes, got only pt1_cam1_x"),
         ("x,y,x,y\n1,2,3,4\n", "must hold one target, got x 2 times, y 2 times"),
+        ("x,y,z\n1,2,3\n1,2,4\n", "must be the track of one camera, got x, y and z"),
         ("x (mm),y (mm)\n1,2\n", r"must have columns u and v, got x \(mm\), y \(mm\)"),
         (TRACKMATE.replace("(pixel)", "(micron)"), "must have positions in pixels, got micron"),
         ("<TrackMate><Model/></TrackMate>", "must be a table, or <Tracks> of TrackMate"),

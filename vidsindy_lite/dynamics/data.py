@@ -130,6 +130,8 @@ def coordinate_names(pairs: Sequence[tuple[Floats, Floats]]) -> tuple[str, ...]:
     columns = [list(getattr(frame, "columns", [])) for _, frame in pairs]
     if any(names != columns[0] for names in columns):
         raise ValueError(f"x: columns must be named alike in all trajectories, got {columns}")
+    if len(set(columns[0])) < len(columns[0]):
+        raise ValueError(f"x: columns must have names of their own, got {columns[0]}")
     for times, frame in pairs:
         for name in columns[0]:
             clock = str(name).lower() in ("t", "time", "times", "seconds", "timestamp")

@@ -546,12 +546,12 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
 def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:
     """Does the curve miss the data, or by less than the errors that were given?"""
     residual, names = residual_noise(fit), problem.form.names
-    # Less than a hundredth of the spread does not matter.
-    seen = (fit.collocation.counts > 0) & (residual > 1e-2)
+    # Less than a hundredth of the spread does not matter, unless error bars are made of it.
+    seen = (fit.collocation.counts > 0) & ((residual > 1e-2) | problem.measured_errors)
     ratio = np.where(seen, residual / problem.noise, 0.0)
     misses = ~(ratio < CONSISTENT)
     # A curve without a law follows errors that last, too: they are no misfit.
-    if misses.any() and wider.further.size and not wider.significant:
+    if misses.any() and wider.further.size and not (wider.significant or problem.measured_errors):
         misses &= ~passing(fit, len(wider.problem.exponents))
     if misses.any():
         j = int(np.where(misses, ratio, 0.0).argmax())

@@ -49,7 +49,7 @@ CLOCK = "t"  #: The time as a variable of a law: after all others, with dt/dt = 
 def name_latex(name: str) -> str:
     """A variable as LaTeX: digits at its end become an index."""
     letters = name.rstrip("0123456789")
-    return name if letters == name else f"{letters}_{{{name[len(letters) :]}}}"
+    return name if letters == name else f"{letters.rstrip('_')}_{{{name[len(letters) :]}}}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +69,10 @@ class Function:
         in the equation of its direction alone, and all have one coefficient.
     unsure : ndarray, shape (k, 2)
         Times between which it jumps, nobody knows when.
+    timed : bool
+        Whether it depends on the time, alone or beside the state.
+    inputs : mapping of str to Input
+        By which it does so.
     """
 
     name: str
@@ -77,6 +81,8 @@ class Function:
     axes: Sequence[int]
     direction: int | None = None
     unsure: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    timed: bool = False
+    inputs: Mapping[str, Input] = field(default_factory=dict)
 
     @classmethod
     def unknown(cls, name: str) -> Function:
@@ -332,7 +338,7 @@ def _curve(name: str, t: Floats, values: Floats, hold: str | None) -> tuple[BSpl
     if hold is None:
         middles, steps = (t[1:] + t[:-1]) / 2, np.abs(np.diff(values))
         # Midway a cubic is so far from a line at six samples of a sine a period: more is a guess.
-        much = 0.1 * values.std()
+        much = 0.1 * values.std() + 1e-9 * np.abs(values).max()  # more than rounding
         bend = np.abs(curves["cubic"](middles) - curves["linear"](middles))
         hold = "zero" if (bend > much).any() else "cubic"
         if hold == "zero":
@@ -711,8 +717,9 @@ def own(
             + (", ".join(unknown) or "none")
             + ": velocities are variables of a law of order=2" * moving
         )
-    axes = [names.index(argument) for argument in arguments if argument in names]
-    axes = [axis for axis in axes if names[axis] != CLOCK or axis < measured]
+    named = [names.index(argument) for argument in arguments if argument in names]
+    axes = [axis for axis in named if names[axis] != CLOCK or axis < measured]
+    used = {argument: inputs[argument] for argument in arguments if argument in inputs}
 
     def evaluate(x: Floats) -> Floats:
         values = dict(zip(names, x.T, strict=True))
@@ -736,12 +743,15 @@ def own(
 
     def component(j: int) -> Function:
         of = names[j]
-        return Function(f"{name}_{of}", f"{latex}_{{{of}}}", lambda x: evaluate(x)[j], axes, j)
+        return replace(
+            whole, name=f"{name}_{of}", latex=f"{latex}_{{{of}}}", direction=j,
+            value=lambda x: evaluate(x)[j],
+        )  # fmt: skip
 
-    if len(shape) == 1:
-        made = Function(name, latex, evaluate, axes)
-        return [replace(made, unsure=rule.unsure) if isinstance(rule, Input) else made]
-    return [component(j) for j in range(measured)]
+    whole = Function(name, latex, evaluate, axes, timed=bool(used) or axes != named, inputs=used)
+    if isinstance(rule, Input):
+        whole = replace(whole, unsure=rule.unsure, inputs={name: rule})
+    return [whole] if len(shape) == 1 else [component(j) for j in range(measured)]
 
 
 def _arguments(rule: Callable[..., ArrayLike]) -> list[str]:

@@ -170,12 +170,12 @@ def physics_of(
 def _without_time(law: PolynomialSystem, covariance: Floats) -> tuple[PolynomialSystem, Floats]:
     """The terms of a law that do not hold the time, its last variable, as a law of the others."""
     d, (l, width) = law.d, law.exponents.shape
-    timely = [d - 1, *(d + k for k, function in enumerate(law.functions) if function.of_time)]
+    timely = [d - 1, *(d + k for k, function in enumerate(law.functions) if function.timed)]
     timely += [width - 1] if width > d + len(law.functions) else []  # the slope of the time
     rows = np.flatnonzero(~law.exponents[:, timely].any(axis=1))
     calm = PolynomialSystem(
         law.names[:-1], np.delete(law.exponents[rows], timely, axis=1), law.coefficients[rows, :-1],
-        functions=tuple(function for function in law.functions if not function.of_time),
+        functions=tuple(function for function in law.functions if not function.timed),
     )  # fmt: skip
     kept = (np.arange(d - 1)[:, None] * l + rows).ravel()
     return calm, covariance[np.ix_(kept, kept)]

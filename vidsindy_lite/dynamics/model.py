@@ -30,6 +30,7 @@ from .l0 import LEAST
 from .library import (
     CLOCK,
     Function,
+    Input,
     Library,
     check_mapping,
     closure,
@@ -506,17 +507,23 @@ class PolynomialSystem:
         if self.timed and np.shape(x0) != (self.d,):
             x0 = np.append(check_vector("x0", x0, self.states), t[0])
         x0, clock = check_vector("x0", x0, self.d), np.zeros(self.d)
-        inputs, since = self.inputs(), t - t[0]
+        driven, since = self.driven(), t - t[0]
         if self.timed:
             if abs(x0[-1] - t[0]) > 1e-6 * (since[-1] or 1.0):
                 raise ValueError(f"x0: its time must be that of t, {t[0]:g}, got {x0[-1]:g}")
             x0[-1], clock[-1] = 0.0, t[0]  # counted from the first, times are exact
-        for times in (t, np.linspace(t[0], t[-1], 1000)):  # it may be unknown between two
-            self.check_inputs(times)
-        # A step ends just before an input jumps, and one just after.
-        at = [jumps(partial(one.at, d=self.d), t) - t[0] for one in inputs]
-        just = 2e-9 * np.diff(t).max(initial=0.0)
-        every = np.unique(np.concatenate([since, *at, *(np.maximum(one - just, 0) for one in at)]))
+        # A step ends at each sample of an input, just before one jumps, and just after.
+        pieces = [
+            piece for one in driven.values() if isinstance(one, Input) for piece in one.pieces
+        ]
+        times = np.unique(np.concatenate([t, *(piece.t for piece in pieces)]))
+        times = times[(t[0] <= times) & (times <= t[-1])]
+        between = (times[1:] + times[:-1]) / 2, np.linspace(t[0], t[-1], 1000)
+        self.check_inputs(np.concatenate([times, *between]))
+        at = [jumps(one, times) - t[0] for one in driven.values()]
+        just = 2e-9 * np.diff(times).max(initial=0.0)
+        every = [times - t[0], *at, *(np.maximum(one - just, 0) for one in at)]
+        every = np.unique(np.concatenate(every))
         fraction, size = bool(self.implicit.any()), self.d + len(self.functions)
         above, below = (
             sums(self.exponents[rows, :size], self.coefficients[rows])
@@ -534,20 +541,22 @@ class PolynomialSystem:
         path, end = integrate(rate, every, x0, farthest)
         return path[np.searchsorted(every, since)] + clock, end
 
-    def inputs(self) -> list[Function]:
-        """The functions of the time alone that the law has."""
-        used = self.exponents[self.support.any(axis=1), self.d :].sum(axis=0)
-        known = zip(self.functions, used.tolist(), strict=False)
-        return [function for function, times in known if function.of_time and times]
+    def driven(self) -> dict[str, Callable[[Floats], Floats]]:
+        """The inputs and the functions of the time alone that the law has, each of times (n,)."""
+        used = self.exponents[self.support.any(axis=1), self.d :].any(axis=0)
+        found: dict[str, Callable[[Floats], Floats]] = {}
+        for function in (f for f, there in zip(self.functions, used, strict=False) if there):
+            if function.of_time:
+                found[function.name] = partial(function.at, d=self.d)
+            found |= function.inputs
+        return found
 
     def check_inputs(self, t: Floats) -> None:
         """Refuse times (n,) at which an input in the law is not known."""
-        for function in self.inputs():
-            unknown = ~np.isfinite(function.at(t, self.d))
+        for name, value in self.driven().items():
+            unknown = ~np.isfinite(value(t))
             if unknown.any():
-                raise ValueError(
-                    f"t: must lie where {function.name} is known, got {t[unknown][0]:g}"
-                )
+                raise ValueError(f"t: must lie where {name} is known, got {t[unknown][0]:g}")
 
     def sides(self) -> dict[int, str]:
         """What stands left in text, by number of equation: ``dx/dt``, or ``x''`` of order 2."""
@@ -753,6 +762,9 @@ class Form:
             form = form._given({of: dict(terms) for of, terms in library.given}, names[sought])
         if not form.candidates.any():
             raise ValueError("library: must leave a term to be found, got all of them given")
+        terms = form.law(known).terms
+        if clash := next((term for term in terms if terms.count(term) > 1), None):
+            raise ValueError(f"library: a term must have a name of its own, got {clash!r} twice")
         return form
 
     def _given(
@@ -780,8 +792,9 @@ class Form:
                 if row in there:
                     if named.setdefault(int(common[row]), value) != value:
                         raise ValueError(
-                            "library: the directions of a vector have one coefficient, got "
-                            f"{named[int(common[row])]} and {value} in the equation of {equation}"
+                            "library: a term has one coefficient, and so have the directions of a "
+                            f"vector, got {named[int(common[row])]} and {value} for {term!r} in "
+                            f"the equation of {equation}"
                         )
                 elif term != OTHERS:
                     names = ", ".join(self.law(self.known).terms[k] for k in there)

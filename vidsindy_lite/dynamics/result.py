@@ -18,7 +18,7 @@ from scipy.interpolate import BSpline
 from tqdm import tqdm
 
 from ..arrays import Bools, Floats
-from ..checks import MALFORMED, check_array, check_choice, check_output, shown
+from ..checks import MALFORMED, check_array, check_choice, check_instance, check_output, shown
 from ..storage import check_file, read_tree, write_file
 from ..values import built, decoded, encoded
 from .bspline import smooth
@@ -346,11 +346,16 @@ class Discovery:
     def predict(self, x: Floats) -> Floats:
         """Time derivative at states, shape (n, d) or (d,), in units of the data.
 
+        The columns of a data frame may have any order, if they are named like the variables.
+
         Raises
         ------
         ValueError
             If the states have another shape, or an input of the law is not known at their times.
         """
+        names = self.system.names
+        if set(names) <= set(getattr(x, "columns", ())):
+            x = x[list(names)]
         slopes = self.system(x)
         self.system.check_inputs(np.atleast_2d(x)[:, -1])
         return slopes
@@ -378,7 +383,7 @@ class Discovery:
     def physics(self, down: ArrayLike | None = None) -> Physics:
         """What a law of motion says of a body: g and drag, or springs and periods; its energy.
 
-        Of a body on a circle, see `swing`, that of its angle.
+        Of a body on a circle, see `swing`, that of its angle, which knows no directions.
 
         Parameters
         ----------
@@ -437,7 +442,7 @@ class Discovery:
         Raises
         ------
         ValueError
-            If the file cannot be there: it is a folder, or its folder does not exist.
+            If the file cannot be there: it is a folder.
         """
         file = check_output("path", path)
         content = {
@@ -467,6 +472,8 @@ class Discovery:
             If the file holds none, or the library not all functions of the law, or others.
         """
         file = check_file("path", path, "file of a discovery")
+        if library is not None:
+            check_instance("library", library, Library)
         content = read_tree("path", file, ".json")
         message = f"path: must be a file that Discovery.save has written, got '{file}'"
         if not isinstance(content, dict) or content.get("format") != FORMAT:
