@@ -145,12 +145,14 @@ def test_a_film_that_shows_fewer_is_refused_with_all_tracks():
     one = both.copy()
     one[:, 2:] = np.nan
     with pytest.raises(Refused, match="b.mov must show 2 moving targets, got 1 in any") as refused:
-        check_found([both, one], ["a.mov", "b.mov"], 2)
+        check_found([both, one], ["a.mov", "b.mov"], 2, [[], []])
     assert refused.value.step == "track"
     assert len(refused.value.tracks) == 2
-    with pytest.raises(Refused, match="b.mov must show one moving target, got none in any"):
-        check_found([both[:, :2], one[:, 2:]], ["a.mov", "b.mov"], 1)
-    check_found([both, both], ["a.mov", "b.mov"], 2)
+    with pytest.raises(
+        Refused, match="b.mov must show one .*, got none in any frame: no red; what m"
+    ):
+        check_found([both[:, :2], one[:, 2:]], ["a.mov", "b.mov"], 1, [[], ["no red"]])
+    check_found([both, both], ["a.mov", "b.mov"], 2, [[], []])
 
 
 def test_two_views_cannot_tell_targets_apart(films):

@@ -65,6 +65,10 @@ def _parser() -> argparse.ArgumentParser:
 class _Parser(argparse.ArgumentParser):
     """A parser that refuses as the package does: argument, rule and value in one line."""
 
+    def __init__(self, *args: Any, **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        self._negative_number_matcher = re.compile(r"-[\d.]")  # of lists of numbers, too
+
     def error(self, message: str) -> NoReturn:
         told = re.fullmatch(r"(.*)invalid choice: (.*) \(choose from (.*)\)", message)
         if told:

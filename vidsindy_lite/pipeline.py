@@ -184,8 +184,9 @@ def observe(
         for path, shot, hint in bar(progress, "track", iterable=films)
     ]
     tracks = [np.hstack([track.pixels for track in found]) for found in seen]
-    check_found(tracks, names, targets)
-    doubts = [warning for found in seen for track in found for warning in track.warnings]
+    told = [[warning for track in found for warning in track.warnings] for found in seen]
+    check_found(tracks, names, targets, told)
+    doubts = sum(told, [])
     conclude = _observed if targets == 1 else _several_observed
     return conclude(tracks, rig, clock, starts, names, doubts, progress)
 
@@ -507,8 +508,12 @@ def _missed(rows: Ints, track: Floats) -> Floats:
     return np.linalg.norm(missed, axis=1) / np.sqrt(1 + (weights**2).sum(axis=1))
 
 
-def check_found(tracks: Sequence[Floats], names: Sequence[str], targets: int) -> None:
+def check_found(
+    tracks: Sequence[Floats], names: Sequence[str], targets: int, told: Sequence[Sequence[str]]
+) -> None:
     """That each video shows its targets: all are tracked first, so that all can be looked at.
+
+    What is told of each track says why it does not.
 
     Raises
     ------
@@ -516,12 +521,13 @@ def check_found(tracks: Sequence[Floats], names: Sequence[str], targets: int) ->
         If one does not.
     """
     wanted = "one moving target" if targets == 1 else f"{targets} moving targets"
-    for pixels, name in zip(tracks, names, strict=True):
+    still = "what moves by less than a tenth of its own width is taken for background"
+    for pixels, name, causes in zip(tracks, names, told, strict=True):
         found = int(np.isfinite(pixels).any(axis=0).sum()) // 2
         if found < targets:
             raise Refused(
-                f"paths: {name} must show {wanted}, got {found or 'none'} in any frame: what "
-                "moves by less than a tenth of its own width is taken for background",
+                f"paths: {name} must show {wanted}, got {found or 'none'} in any frame: "
+                f"{'; '.join((*causes, still))}",
                 "track",
                 tracks,
             )

@@ -178,11 +178,14 @@ def discover_from_video(
     of_film, of_table = hint is not None or detector != "auto", individual is not None
     if of_film if table else of_table:
         raise ValueError(
-            "individual: must be given with a text file of tracks alone, hint and detector with a "
-            f"film, got {name}"
+            f"{'hint and detector' if table else 'individual'}: must be given with a "
+            f"{'film' if table else 'text file of tracks'}, got {name}"
         )
     size, look = _table(path, fps, individual) if table else _film(path, fps, hint, detector)
     marks, places, measured = four_places(length, up, corners, size, within=not table)
+    if table:  # the picture holds the marks, too
+        width, height = np.maximum(size, marks.max(axis=0).astype(int) + 1).tolist()
+        size = width, height
     to_plane = homography_of(marks, places)
     error = float(np.hypot(share, np.sqrt(2) * MARK / measured)) if measured else 0.0
     unit = "m" if measured else "px"
@@ -198,7 +201,7 @@ def discover_from_video(
     t, pixels, first, warnings = look()
     if frames is not None:
         pixels = _between(frames, pixels, first)
-    check_found([pixels], [name], 1)
+    check_found([pixels], [name], 1, [warnings])
     pixels, left_out = without_wild(pixels, name)
     pixels, held = _let_go(pixels, first) if frames is None else (pixels, "")
     rig = noted(rig, left_out, held)
@@ -255,7 +258,8 @@ def _table(
     read = read_tracks(path, individual)
     if len(read) > 1 or read[0].upwards:
         got = f"{len(read)} cameras" if len(read) > 1 else "one that counts v from below"
-        raise ValueError(f"path: must hold the track of one camera, v downwards, got {got}")
+        told = f"path: {path.name} must hold the track of one camera, v downwards, got {got}"
+        raise ValueError(told)
     (track,), (times, doubts) = read, times_of(read, None, fps)
     width, height = (int(most) + 1 for most in np.fmax.reduce(track.pixels, axis=0, initial=0.0))
     t, warnings = np.array(times, float)[0], (*track.warnings, *doubts)
@@ -331,8 +335,8 @@ def four_places(
         origin, middle, pixels = ends[0], ends.mean(axis=0), float(np.hypot(*(ends[1] - ends[0])))
         if not (pixels > 2 * MARK and metres > 0):
             raise ValueError(
-                "length: must be two marks apart from each other and a distance above 0, "
-                f"got {tuple(length)}"
+                f"length: must be two marks more than {2 * MARK:g} pixels apart and a distance "
+                f"above 0, got {tuple(length)}"
             )
     axes = np.array([[-upwards[1], upwards[0]], upwards])
     marks, scale = middle + (pixels or 1.0) * (square - 0.5) @ axes, metres / (pixels or 1.0)
@@ -410,6 +414,6 @@ def _contradicted(found: PlaneDiscovery, vertical: bool, askew: bool) -> list[st
         if abs(tilt) > SURE * np.hypot(float(off[0]), error):
             doubts.append(
                 f"up: the pull is {np.rad2deg(tilt):.3g} degrees off the vertical {whose}: if a "
-                "slope bears it, it is no g"
+                "slope bears it, it is no g; if v is counted upwards, it is upside down"
             )
     return doubts

@@ -248,7 +248,10 @@ def test_where_two_things_move_alike_it_says_so_and_a_hint_decides(tmp_path):
         return disc(disc(image, both[0][i], 8, (30, 30, 210)), both[1][i], 8, (30, 30, 210))
 
     path = painted(tmp_path, texture(np.random.default_rng(0), 320, 240), draw, 60)
-    assert any("something else moves" in warning for warning in track(path).warnings)
+    for told in (None, Hint(colour=(30, 30, 210))):  # that of both
+        assert any(
+            "something else moves" in warning for warning in track(path, "auto", told).warnings
+        )
     for truth in both:
         found, error = followed(path, truth, around(truth, 19, 20), 0.9)
         assert np.nanmax(error) < 1

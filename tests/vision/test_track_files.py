@@ -188,7 +188,7 @@ def test_times_are_kept_and_trackers_world_is_not_taken_for_pixels(tmp_path):
         ("u,v\n" + "1" * 400 + ",2\n", "must hold numbers of less than 300 digits"),
         ("u,v\n" + "a" * 200_000 + ",2\n", "field larger than field limit"),
         ("u,v\n1,2\n3,soon\n", "must hold numbers below its header, got 'soon' in row 2"),
-        ("t,u,v\n0,1,2\n0,1,2\n", "must have increasing times, got others as t"),
+        ("t,u,v\n0,1,2\n0,1,2\n", "must have increasing times, got 0 as t in row 1"),
         ("frame,u,v\n1,1,2\n0,1,2\n", "must have increasing whole numbers of frames"),
         ("frame,u,v\n0,1,2\n99999999999,1,2\n", "must have increasing whole numbers"),
         ("t,u1,v1,u2\n0,1,2,3\n", "must have columns of both axes, got only u2"),

@@ -342,7 +342,8 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
         )
     off = np.abs(found.change) / np.where(errors > 0, errors, np.inf)
     # So many of the measurements the tracks tell: of each the share by which it is known better.
-    told = (found.prior > 0).sum() - (found.factor**2).sum(axis=1) @ found.prior
+    left = (found.factor**2).sum(axis=1) * found.prior
+    told = np.clip(1 - left[found.prior > 0], 0, 1).sum()
     squares = (off**2).sum()
     if squares > chdtri(max(told, 1.0), 1e-4):
         i, part = np.unravel_index(off.argmax(), off.shape)

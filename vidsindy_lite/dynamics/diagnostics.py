@@ -116,7 +116,8 @@ def where_round(x: Floats, noise: Floats, places: bool = False) -> Round | None:
     length = float(np.ptp(pieces))
     back = np.abs(np.diff(pieces)).sum() > 1.5 * length
     bound = back or (d > 2 or places) and length > np.pi
-    return where if bound and _on(off, error, widths[-2], 10 * CLOSE if back else CLOSE) else None
+    close, told = (10 * CLOSE, 0.5) if back else (CLOSE, 0.1)
+    return where if bound and _on(off, error, widths[-2], close, told) else None
 
 
 def related(names: Sequence[str], x: Floats, degree: int, error: float) -> Iterator[str]:
@@ -150,13 +151,15 @@ def related(names: Sequence[str], x: Floats, degree: int, error: float) -> Itera
             return
 
 
-def _on(residual: Floats, noise: float, size: float, close: float = CLOSE) -> bool:
+def _on(
+    residual: Floats, noise: float, size: float, close: float = CLOSE, told: float = 0.1
+) -> bool:
     """Whether distances from a shape of some size, (n, k), are those of noise.
 
     Not because noise may hide more: the data have to be good enough to tell a tenth of the size.
     """
     least, most = _distance(residual, noise)
-    return least < close * size and most < 0.1 * size
+    return least < close * size and most < told * size
 
 
 def _distance(residual: Floats, noise: float) -> tuple[float, float]:

@@ -72,10 +72,10 @@ class Flight:
         covariance[np.ix_(free, free)] = np.linalg.pinv(found.jac.T @ found.jac) * size
         return cls(whole(found.x), free, covariance, errors)
 
-    def shared(self, t: Floats, x: Floats, modes: Floats) -> Floats:
-        """What errors that all samples share, (k, n, m), add to the covariance."""
+    def moved(self, t: Floats, x: Floats, modes: Floats) -> Floats:
+        """What errors that all samples share, (k, n, m), do to its numbers, (k, 3 m + 1)."""
         moved = [Flight.fitted(t, x + mode, self.free).theta - self.theta for mode in modes]
-        return np.sum([np.outer(one, one) for one in moved] or [0.0 * self.covariance], axis=0)
+        return np.reshape(moved, (-1, len(self.theta)))
 
     @property
     def force(self) -> Floats:
@@ -155,14 +155,18 @@ def homogeneous(
     apart = richer.theta - flight.theta
     covariance = (richer.covariance + np.outer(apart, apart)) * np.outer(flight.free, flight.free)
     modes = np.zeros((0, *x.shape)) if systematic is None else systematic
-    shared, penalty = flight.shared(since, x, modes), chdtri(1, FALSE_ALARM / (2 * m))
+    # A scale, however wrong it is, makes no force of nothing: what is along the numbers themselves.
+    moved, own = flight.moved(since, x, modes), flight.theta / np.linalg.norm(flight.theta)
+    moved -= np.outer(moved @ own, own)
+    shared, penalty = moved.T @ moved, chdtri(1, FALSE_ALARM / (2 * m))
 
     def told(errors: Floats) -> Bools:
         return flight.theta**2 > penalty * np.diag(errors)
 
     kept = flight.free & (told(covariance + shared) | (numbers < 2 * m))
     law = Flight.fitted(since, x, kept)
-    covariance = covariance + law.shared(since, x, modes)
+    moved = law.moved(since, x, modes)
+    covariance = covariance + moved.T @ moved
     found = _told(law, covariance * np.outer(kept, kept), t, names)
     spread, classes[best] = np.linalg.norm(x.std(axis=0)), law
     supports = [coefficients_of(one.theta, found.system.exponents) != 0 for one in classes]
@@ -174,7 +178,9 @@ def homogeneous(
         )
         for j in range(found.system.d)
     )
-    doubts = _doubt(flight, richer, penalty) or _bent(since, x, flight)
+    doubts: tuple[str, ...] = ()
+    if flight.error > CLEANEST * x.std():  # else its digits are what is left
+        doubts = _doubt(flight, richer, penalty) or _bent(since, x, flight)
     if (flight.free & ~kept & told(flight.covariance + shared)).any():
         doubts = doubts or _doubt(law, flight, penalty)
     doubts = *(doubts or _misfit(x, flight, noise)), *_outlying_ends(t, x)
@@ -221,7 +227,8 @@ def _misfit(x: Floats, flight: Flight, noise: float, most: float = 5.0) -> tuple
     """
     steps = np.abs(np.diff(flight.left, axis=0))
     # Of normal errors the median of a difference's size is .954 of their standard deviation.
-    scatter = max(float(np.median(steps)) / 0.954, CLEANEST * float(x.std()))
+    typical = np.sqrt((np.median(steps, axis=0) ** 2).mean()) / 0.954
+    scatter = max(float(typical), CLEANEST * float(x.std()))
     if flight.error < most * min(scatter, noise) and steps.max() < 2 * GROSS * scatter:
         return ()
     return (
@@ -237,7 +244,10 @@ def _outlying_ends(t: Floats, x: Floats) -> tuple[str, ...]:
     have had the target there, and few such places bend the whole flight.
     """
     since, out = t - t.mean(), max(1, len(t) // 10)
-    inner = Flight.fitted(since[out:-out], x[out:-out], np.ones(3 * x.shape[1] + 1, dtype=bool))
+    free = np.ones(3 * x.shape[1] + 1, dtype=bool)
+    if x[out:-out].size < len(free) + 4:  # hardly any is left over to tell errors
+        return ()
+    inner = Flight.fitted(since[out:-out], x[out:-out], free)
     sizes, axes = np.linalg.eigh(inner.covariance)
     told, moves = places(since, inner.theta), np.sqrt(np.maximum(sizes, 0.0)) * axes
     unsure = [places(since, inner.theta + one) - told for one in moves.T]

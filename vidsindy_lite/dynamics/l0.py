@@ -267,7 +267,7 @@ def newcomers(information: Floats, gradient: Floats, own: int) -> tuple[Floats, 
     left = gradient[own:] - gradient[:own] @ response
     whole = np.diag(information)[own:]
     apart = whole - (information[:own, own:] * response).sum(axis=0)
-    new = apart > 1e-9 * whole  # else the law has it already, but for rounding
+    new = apart > 1e-7 * whole  # else the law has it already, but for rounding
     room = np.where(new, apart, 1.0)
     return np.where(new, left / room, 0.0), np.where(new, 1 / room, np.inf)
 

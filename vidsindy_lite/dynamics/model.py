@@ -522,8 +522,8 @@ class PolynomialSystem:
         self.check_inputs(np.concatenate([times, *between]))
         at = [jumps(one, times) - t[0] for one in driven.values()]
         just = 2e-9 * np.diff(times).max(initial=0.0)
-        every = [times - t[0], *at, *(np.maximum(one - just, 0) for one in at)]
-        every = np.unique(np.concatenate(every))
+        before = [np.maximum(one - just, 0) for one in at]
+        every = np.unique(np.concatenate([times - t[0], *at, *before]))
         fraction, size = bool(self.implicit.any()), self.d + len(self.functions)
         above, below = (
             sums(self.exponents[rows, :size], self.coefficients[rows])
@@ -545,8 +545,8 @@ class PolynomialSystem:
         """The inputs and the functions of the time alone that the law has, each of times (n,)."""
         used = self.exponents[self.support.any(axis=1), self.d :].any(axis=0)
         found: dict[str, Callable[[Floats], Floats]] = {}
-        for function in (f for f, there in zip(self.functions, used, strict=False) if there):
-            if function.of_time:
+        for k in np.flatnonzero(used[: len(self.functions)]).tolist():
+            if (function := self.functions[k]).of_time:
                 found[function.name] = partial(function.at, d=self.d)
             found |= function.inputs
         return found

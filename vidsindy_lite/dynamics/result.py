@@ -355,7 +355,7 @@ class Discovery:
         """
         names = self.system.names
         if set(names) <= set(getattr(x, "columns", ())):
-            x = x[list(names)]
+            x = cast("Any", x)[list(names)]
         slopes = self.system(x)
         self.system.check_inputs(np.atleast_2d(x)[:, -1])
         return slopes

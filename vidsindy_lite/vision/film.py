@@ -178,7 +178,7 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
     if len(rows) < _SHORTEST:
         return nothing(film.motion, n, film.doubts)
     ways = expected(both, rows, film, n)
-    doubts = _doubts(film, seen, paths, ways) if hint is None else film.doubts
+    doubts = _doubts(film, seen, paths, ways) if seed is None else film.doubts
     if _differing(seen, both.only(rows)) < 0.5:
         doubts += (_LOOKS_ALONE,)
     views = viewed(film, lens_of(film, ways), ways, lights)
@@ -411,8 +411,8 @@ def _doubts(film: Film, seen: Candidates, paths: list[Motion], ways: Ways) -> tu
         # It may be the target itself, after a gap.
         if not np.median(off / ways.box[at, 2:].max(axis=1)) < 1:
             told = ("something else moves about as plainly, "
-                    f"{_example(film, seen, path)}: if that is the target, say so, "
-                    "target=Hint(frame=, box=)")  # fmt: skip
+                    f"{_example(film, seen, path)}: if that is the target, say so by a hint with "
+                    "a frame and a box")  # fmt: skip
             return (*film.doubts, told)
     return film.doubts
 

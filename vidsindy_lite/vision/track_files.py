@@ -482,8 +482,11 @@ def _track(
         # Seconds in milli-, micro- or nanoseconds, by their first letter.
         letter = (clock[1] or clock[2] or "s")[0]
         t = {"m": 1e-3, "u": 1e-6, "µ": 1e-6, "n": 1e-9}.get(letter, 1.0) * columns[clock[0]]
-        if not np.isfinite(t).all() or (np.diff(t) <= 0).any():
-            raise ValueError(f"must have increasing times, got others as {clock[0]}")
+        if not (rises := np.diff(t, prepend=-np.inf) > 0).all():
+            here = rises.argmin()
+            raise ValueError(
+                f"must have increasing times, got {t[here]:g} as {clock[0]} in row {here}"
+            )
         # No camera takes longer from one frame to the next.
         if len(t) > 1 and (step := np.median(np.diff(t))) > 2.0:
             doubts += (
