@@ -543,7 +543,7 @@ class PolynomialSystem:
 
     def driven(self) -> dict[str, Callable[[Floats], Floats]]:
         """The inputs and the functions of the time alone that the law has, each of times (n,)."""
-        used = self.exponents[self.support.any(axis=1), self.d :].any(axis=0)
+        used = self.exponents[self.support.any(axis=1), self.d :].sum(axis=0)
         found: dict[str, Callable[[Floats], Floats]] = {}
         for k in np.flatnonzero(used[: len(self.functions)]).tolist():
             if (function := self.functions[k]).of_time:
