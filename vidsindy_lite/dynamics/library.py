@@ -306,6 +306,13 @@ class Input:
         """The values at times (n,); NaN where it was not measured."""
         return of_pieces(self.pieces, np.asarray(t, dtype=float))
 
+    @property
+    def breaks(self) -> Floats:
+        """Times of samples at which it begins, jumps, has a kink, or ends."""
+        times = [piece.t[[0, -1]] for piece in self.pieces]
+        times += [p.t[:-1][np.diff(p.c, prepend=p.c[0]) != 0] for p in self.pieces if p.k == 0]
+        return np.concatenate([*times, *(p.t for p in self.pieces if p.k == 1)])
+
 
 def of_pieces(pieces: Sequence[BSpline], t: Floats) -> Floats:
     """What curves of times apart are at times (n,); NaN beyond, but for rounding at their ends."""

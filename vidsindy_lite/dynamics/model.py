@@ -512,11 +512,9 @@ class PolynomialSystem:
             if abs(x0[-1] - t[0]) > 1e-6 * (since[-1] or 1.0):
                 raise ValueError(f"x0: its time must be that of t, {t[0]:g}, got {x0[-1]:g}")
             x0[-1], clock[-1] = 0.0, t[0]  # counted from the first, times are exact
-        # A step ends at each sample of an input, just before one jumps, and just after.
-        pieces = [
-            piece for one in driven.values() if isinstance(one, Input) for piece in one.pieces
-        ]
-        times = np.unique(np.concatenate([t, *(piece.t for piece in pieces)]))
+        # A step ends where an input has a kink, just before it jumps, and just after.
+        breaks = [one.breaks for one in driven.values() if isinstance(one, Input)]
+        times = np.unique(np.concatenate([t, *breaks]))
         times = times[(t[0] <= times) & (times <= t[-1])]
         between = (times[1:] + times[:-1]) / 2, np.linspace(t[0], t[-1], 1000)
         self.check_inputs(np.concatenate([times, *between]))
