@@ -165,7 +165,8 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
     if covered is not None:  # it covers its own ground: before ground that is without it
         others = sighted(film, covered, bare=bare)
         plainer = _paths(others[0], hint, seed)
-        if plainer:
+        # Where nothing rivals it, ground on which it is less plain is guessed, and wrong.
+        if plainer and (_rivals(paths) or plainer[0].rating > 0.8 * paths[0].rating):
             (seen, lights), paths = others, plainer
     rows = paths[0].rows if paths else np.zeros(0, int)
     start = seed or _plainest(seen, rows)
