@@ -165,8 +165,9 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
     if covered is not None:  # it covers its own ground: before ground that is without it
         others = sighted(film, covered, bare=bare)
         plainer = _paths(others[0], hint, seed)
-        # Where nothing rivals it, ground on which it is less plain is guessed, and wrong.
-        if plainer and (_rivals(paths) or plainer[0].rating > 0.8 * paths[0].rating):
+        # Unless these were two crescents, ground on which it is less plain is guessed, and wrong.
+        least = 0.7 * paths[0].rating
+        if plainer and any(path.rating > least for path in (plainer[0], *paths[1:])):
             (seen, lights), paths = others, plainer
     rows = paths[0].rows if paths else np.zeros(0, int)
     start = seed or _plainest(seen, rows)
