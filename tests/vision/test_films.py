@@ -44,7 +44,7 @@ def around(place, side, frame=10):
     return Hint(frame=frame, box=(*(place[frame] - side / 2), side, side))
 
 
-def painted(folder, ground, draw, n, noise=2.0, seed=0):
+def painted(folder, ground, draw, n, noise=2.0, seed=0, codec=None):
     """A film of which `draw` paints each frame on a ground."""
     rng = np.random.default_rng(seed)
 
@@ -54,7 +54,7 @@ def painted(folder, ground, draw, n, noise=2.0, seed=0):
             image = image + noise * rng.normal(size=image.shape)
             yield np.clip(image, 0, 255).astype(np.uint8)
 
-    return write_video(folder / "film.mov", frames())
+    return write_video(folder / ("film.mp4" if codec else "film.mov"), frames(), codec=codec)
 
 
 def followed(path, truth, target=None, least=0.95):
@@ -63,6 +63,15 @@ def followed(path, truth, target=None, least=0.95):
     error = np.linalg.norm(found.pixels - truth, axis=1)
     assert np.isfinite(error).mean() >= least
     return found, error
+
+
+@pytest.mark.parametrize("seed", [0, 7])
+def test_a_ball_that_hardly_leaves_its_own_ground_in_compressed_film(tmp_path, seed):
+    truth = [160, 90] + 15 * np.column_stack([0 * ANGLE, np.cos(2 * ANGLE)])[:70]
+    ground = texture(np.random.default_rng(seed), 320, 180)
+    path = painted(tmp_path, ground, ball(truth, 9, (230, 200, 30)), 70, 1.0, 1, "mp4v")
+    _, error = followed(path, truth)
+    assert np.nanmax(error) < 1
 
 
 def test_a_large_ball_that_never_leaves_its_own_ground(tmp_path):
