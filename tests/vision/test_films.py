@@ -65,7 +65,7 @@ def followed(path, truth, target=None, least=0.95):
     return found, error
 
 
-@pytest.mark.parametrize("seed", [0, 7])
+@pytest.mark.parametrize("seed", [0, 9])
 def test_a_ball_that_hardly_leaves_its_own_ground_in_compressed_film(tmp_path, seed):
     truth = [160, 90] + 15 * np.column_stack([0 * ANGLE, np.cos(2 * ANGLE)])[:70]
     ground = texture(np.random.default_rng(seed), 320, 180)
