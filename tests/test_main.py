@@ -64,10 +64,7 @@ def here(folder, tmp_path, monkeypatch):
         (["--rig", "rig.toml", "--seed", "x"], "seed: must be an integer, got 'x'"),
         (["--rig", "rig.toml", "--loud"], "unrecognized arguments: --loud"),
         (["--rig", "rig.toml", "--individual", "a"], "individual: must be given with one camera"),
-        (
-            ["--rig", "rig.toml", "--degree", "2", "--library", "fourier(1)"],
-            "degree: must not be given with a library, got 2 and fourier(1)",
-        ),
+        (["--rig", "rig.toml", "--degree", "2", "--library", "fourier(1)"], "a library, got 2"),
     ],
 )
 def test_bad_commands_are_told_in_one_line_before_anything_is_tracked(
@@ -151,10 +148,7 @@ def test_a_refusal_has_one_line_and_a_picture(tracked, capsys):
         (["--tracks", "a.csv", "b.csv", "c.csv"], "fps: must be given, or t, as a.csv states no"),
         (["--tracks", "a.csv", "none.csv"], "tracks: no such file, got 'none.csv'"),
         (["--tracks", "1.csv", "1.csv", "1.csv", "--fps", "9"], "tracks: must have two frames or"),
-        (
-            ["--tracks", "a.csv", "--individual", "mouse"],
-            "tracks: must name the individual 'mouse'",
-        ),
+        (["--tracks", "a.csv", "--individual", "mouse"], "must name the individual 'mouse'"),
     ],
 )
 def test_bad_tracks_are_told(tracked, capsys, options, message):

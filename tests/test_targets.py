@@ -126,10 +126,7 @@ def test_laws_of_second_order_name_their_targets_by_places_and_velocities():
         ({"targets": 0}, "targets: must be an integer of at least 1"),
         ({"detector": "learned"}, "targets: 2 are found by detector='auto' alone"),
         ({"hints": [vl.Hint(frame=0, box=(1, 1, 9, 9)), None, None]}, "targets: 2 are found by"),
-        (
-            {"hints": vl.Hint(frame=0, box=(1, 1, 9, 9))},
-            "hints: must be a list, one per video, got",
-        ),
+        ({"hints": vl.Hint(frame=0, box=(1, 1, 9, 9))}, "hints: must be a list, one per video"),
         ({"rig": None}, "targets: 2 need three cameras .* got 0 of known ones"),
         ({"targets": 1, "hints": [None]}, "hints: must be one per video, got 1 for 3"),
     ],

@@ -161,30 +161,18 @@ def test_a_sum_is_a_union():
         (Library.polynomial(1) + Library.terms({"1": lambda x: x**2}), "of its own, got '1' twice"),
         (Library.terms({"s": lambda x: math.sin(x)}), "'s' must take and return arrays .* Type"),
         (Library.terms({"a": lambda x: 1.0}), r"'a' must return an array of the shape"),
-        (
-            Library.terms({"a": lambda x: [x, x, x]}),
-            r"'a' must return .* or 2 of these, got shape .3, 2.",
-        ),
+        (Library.terms({"a": lambda x: [x, x, x]}), r"'a' must return .* 2 of these, .* .3, 2."),
         (Library.terms({"a": lambda x: np.ones(2)}), r"shape .2,. for n = 2 and .2,. for n = 97"),
-        (
-            Library.terms({"a": lambda x: np.log(-2 - x)}),
-            r"library: a must be finite on the data, got no such value at \(1, ",
-        ),
+        (Library.terms({"a": lambda x: np.log(-2 - x)}), r"a must be .* at \(1, "),
         (
             Library.polynomial(1) + Library.inputs([0, 2, 9], {"u": [1, 0, 2]}, hold="linear"),
             "library: u must be finite on the data, got no such value at t = 9.03",
         ),
-        (
-            Library.polynomial(2) + Library.terms({"square": lambda x: x**2}),
-            "library: its terms must not be zero or depend on each other on the data, got square",
-        ),
+        (Library.polynomial(2) + Library.terms({"square": lambda x: x**2}), "got square"),
         (lambda: Library.parse("polynomial(3) + tan(1)"), r"a sum of .*'tan\(1\)'"),
         (lambda: Library.fourier(0), "harmonics: must be an integer of at least 1, got 0"),
         (lambda: Library.terms({"a": 1}), "functions: must map names to functions, got 'a': 1"),
-        (
-            lambda: Library.terms({"a": np.sin}) + Library.terms({"a": np.cos}),
-            "library: a name may stand for one function, got 'a' twice",
-        ),
+        (lambda: Library.terms({"a": np.sin}) + Library.terms({"a": np.cos}), ".* 'a' twice"),
     ],
 )
 def test_a_library_that_does_not_suit_is_refused_in_one_line(library, words):

@@ -255,20 +255,14 @@ RUNS, CURVE = [(T, X), (T, X)], np.ones((2, 200, 2))
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (
-            {"systematic": CURVE[:, :9]},
-            r"systematic: must have shape \(k, 200, 2\), got \(2, 9, 2\)",
-        ),
+        ({"systematic": CURVE[:, :9]}, r"must have shape \(k, 200, 2\), got \(2, 9, 2\)"),
         ({"systematic": CURVE[0]}, r"systematic: must have shape \(k, 200, 2\), got \(200, 2\)"),
         ({"systematic": np.nan * CURVE}, "systematic: must be finite where x is"),
         ({"t": RUNS, "x": None, "systematic": [CURVE]}, "systematic: must be one per trajectory"),
         ({"t": RUNS, "x": None, "systematic": [CURVE, CURVE[:1]]}, "must hold the same causes"),
         ({"systematic": -1}, r"systematic: must have shape \(k, n, d\), got -1"),
         ({"sigma": 0}, "sigma: must be finite and positive where x is, got 0"),
-        (
-            {"sigma": [0.1] * 3},
-            r"sigma: must be .*, or have shape \(2,\) or \(200, 2\), got \(3,\)",
-        ),
+        ({"sigma": [0.1] * 3}, r"sigma: must .*, or have shape \(2,\) or \(200, 2\), got \(3,\)"),
         ({"t": RUNS, "x": None, "sigma": [0.1] * 3}, "sigma: must be one per .*, got 3 for 2"),
         ({"origin": "here"}, "origin: must be one of learn, data, got 'here'"),
         ({"t": [(T, X), (T, X * [1, np.nan])], "x": None}, "in all trajectories or in none, got c"),

@@ -247,23 +247,14 @@ def test_an_input_is_a_spline_and_unknown_outside():
     ("given", "message"),
     [
         (lambda: Library.inputs(T, {"u": T[1:]}), r"u must have shape \(600,\), .* got \(599,\)"),
-        (
-            lambda: Library.inputs(T, {"u": np.where(T > 3, np.nan, T)}),
-            r"u must be finite, got NaN or infinity at t = 3\.0",
-        ),
+        (lambda: Library.inputs(T, {"u": np.where(T > 3, np.nan, T)}), r"u must be .* at t = 3\.0"),
         (lambda: Library.inputs(T, {"u v": T}), "inputs: must be named like variables.* got 'u v'"),
         (lambda: Library.inputs([1.0], {"u": [1.0]}), "at least 2 samples, got 1"),
         (lambda: Library.inputs(T + 1.7e9, {"u": T}), "told apart to a ten-millionth of their"),
         (lambda: Library.inputs([T, T], {"u": [T]}), "u: must be one per .*, got 1 for 2"),
         (lambda: Library.inputs([T, T], {"u": [T, T]}), "times apart .* to t = 40 and one from"),
-        (
-            lambda: vl.discover(T, FORCED, library=CUBIC + Library.inputs(T, {"x": T})),
-            "must have a name of its own, got 'x' twice",
-        ),
-        (
-            lambda: vl.discover(T + 1, FORCED, library=CUBIC + U),
-            "u must be finite on the data, got no such value at t = 40.0",
-        ),
+        (lambda: vl.discover(T, FORCED, library=CUBIC + Library.inputs(T, {"x": T})), "'x' twice"),
+        (lambda: vl.discover(T + 1, FORCED, library=CUBIC + U), "u must be finite .* t = 40.0"),
     ],
 )
 def test_bad_inputs_are_refused_in_one_line(given, message):
