@@ -178,9 +178,8 @@ def homogeneous(
         )
         for j in range(found.system.d)
     )
-    doubts: tuple[str, ...] = ()
-    if flight.error > CLEANEST * x.std():  # else its digits are what is left
-        doubts = _doubt(flight, richer, penalty) or _bent(since, x, flight)
+    exact = flight.error < CLEANEST * x.std()  # digits are what is left
+    doubts = () if exact else _doubt(flight, richer, penalty) or _bent(since, x, flight)
     if (flight.free & ~kept & told(flight.covariance + shared)).any():
         doubts = doubts or _doubt(law, flight, penalty)
     doubts = *(doubts or _misfit(x, flight, noise)), *_outlying_ends(t, x)

@@ -443,7 +443,7 @@ def _track(
         # Edges of the first pixel are at -0.5 and 0.5; a box without an area is none.
         pixels = np.where((sides > 0).all(axis=0), low + sides / 2 - 0.5, np.nan).T
         doubts += (f"{name}: the middles of its boxes are taken, of {', '.join(box[0] + box[1])}",)
-    elif pair == ("x", "y") and np.ptp(columns.get("z", np.zeros(1))) > 0:
+    elif pair == ("x", "y") and np.nanstd(columns.get("z", 0.0)) > 0:
         raise ValueError(
             "must be the track of one camera, got x, y and z: a path in space needs no cameras, "
             "give it to vl.discover(t, x)"
