@@ -90,7 +90,8 @@ def where_round(x: Floats, noise: Floats, places: bool = False) -> Round | None:
 
     Of two coordinates that go round, one may be the speed of the other, or hunt it: only what turns
     back on its arc, as nothing does that is not bound to it, is a bob; it may be ten times as far
-    off. Of what are ``places`` for sure, as in space, half a turn is enough.
+    off, and its arc twice as high as the noise. Of what are ``places`` for sure, as in space, half
+    a turn is enough.
     """
     moves = _moving(x, noise)
     x, noise, d = x[:, moves], noise[moves], int(moves.sum())
@@ -156,7 +157,7 @@ def _on(
 ) -> bool:
     """Whether distances from a shape of some size, (n, k), are those of noise.
 
-    Not because noise may hide more: the data have to be good enough to tell a tenth of the size.
+    Not because noise may hide more: the data have to be good enough to tell a share of the size.
     """
     least, most = _distance(residual, noise)
     return least < close * size and most < told * size
