@@ -67,8 +67,6 @@ class Function:
     direction : int, optional
         Of a component of a vector, which one it is: the first has the others after it, each stands
         in the equation of its direction alone, and all have one coefficient.
-    unsure : ndarray, shape (k, 2)
-        Times between which it jumps, nobody knows when.
     timed : bool
         Whether it depends on the time, alone or beside the state.
     inputs : mapping of str to Input
@@ -80,7 +78,6 @@ class Function:
     value: Callable[[Floats], Floats]
     axes: Sequence[int]
     direction: int | None = None
-    unsure: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     timed: bool = False
     inputs: Mapping[str, Input] = field(default_factory=dict)
 
@@ -660,11 +657,7 @@ class Library:
         for name, rule in self.functions:
             functions += own(names, measured, name, rule, inputs)
         taken = [*names, *(function.name for function in functions)]
-        if clash := next((name for name in taken if taken.count(name) > 1), None):
-            raise ValueError(
-                f"library: a term must have a name of its own, got {clash!r} twice (with order 2, "
-                "x are positions alone, of which the velocities are made)"
-            )
+        check_own_names(taken)
         powers = np.empty((0, d), dtype=int)
         if self.degree is not None:
             powers = np.pad(monomial_exponents(states, self.degree), ((0, 0), (0, d - states)))
@@ -689,6 +682,15 @@ def check_library(degree: int | None, library: Library | None) -> Library:
     if library == Library():
         raise ValueError("library: must hold a term, got none")
     return library
+
+
+def check_own_names(terms: Sequence[str]) -> None:
+    """Refuse terms of which two have one name."""
+    if clash := next((name for name in terms if terms.count(name) > 1), None):
+        raise ValueError(
+            f"library: a term must have a name of its own, got {clash!r} twice (with order 2, x "
+            "are positions alone, of which the velocities are made)"
+        )
 
 
 def check_mapping(name: str, value: object, rule: str, of: type = object) -> None:
@@ -727,6 +729,7 @@ def own(
     named = [names.index(argument) for argument in arguments if argument in names]
     axes = [axis for axis in named if names[axis] != CLOCK or axis < measured]
     used = {argument: inputs[argument] for argument in arguments if argument in inputs}
+    used |= {name: rule} if isinstance(rule, Input) else {}
 
     def evaluate(x: Floats) -> Floats:
         values = dict(zip(names, x.T, strict=True))
@@ -747,6 +750,7 @@ def own(
             f"{measured} of these, got shape {shape} for n = 2 and {longer} for n = 97"
         )
     latex = rf"\mathrm{{{name}}}"
+    whole = Function(name, latex, evaluate, axes, timed=axes != named or bool(used), inputs=used)
 
     def component(j: int) -> Function:
         of = names[j]
@@ -755,9 +759,6 @@ def own(
             value=lambda x: evaluate(x)[j],
         )  # fmt: skip
 
-    whole = Function(name, latex, evaluate, axes, timed=bool(used) or axes != named, inputs=used)
-    if isinstance(rule, Input):
-        whole = replace(whole, unsure=rule.unsure, inputs={name: rule})
     return [whole] if len(shape) == 1 else [component(j) for j in range(measured)]
 
 

@@ -33,6 +33,7 @@ from .library import (
     Input,
     Library,
     check_mapping,
+    check_own_names,
     closure,
     extended,
     jumps,
@@ -760,9 +761,7 @@ class Form:
             form = form._given({of: dict(terms) for of, terms in library.given}, names[sought])
         if not form.candidates.any():
             raise ValueError("library: must leave a term to be found, got all of them given")
-        terms = form.law(known).terms
-        if clash := next((term for term in terms if terms.count(term) > 1), None):
-            raise ValueError(f"library: a term must have a name of its own, got {clash!r} twice")
+        check_own_names(form.law(known).terms)
         return form
 
     def _given(

@@ -496,7 +496,8 @@ def pose(
     trajectories = [
         (t / step, (values.compress(seen, axis=1) - centre) / scale) for t, values in measured
     ]
-    unsure = np.concatenate([np.zeros((0, 2)), *(f.unsure for f in form.functions)]) / step
+    inputs = {name: one for f in form.functions for name, one in f.inputs.items()}
+    unsure = np.concatenate([np.zeros((0, 2)), *(one.unsure for one in inputs.values())]) / step
     unsure = np.sort(unsure[np.ptp(unsure, axis=1) > 0.5], axis=0)  # others are known well
     penalties = PENALTIES[:1] if through else PENALTIES
     stretches, curves, noise = _smoothed(trajectories, unsure, rng, penalties)

@@ -165,7 +165,8 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
     if covered is not None:  # it covers its own ground: before ground that is without it
         others = sighted(film, covered, bare=bare)
         plainer = _paths(others[0], hint, seed)
-        # Unless these were two crescents, ground on which it is less plain is guessed, and wrong.
+        # Unless these were two crescents, ground on which it is less plain is guessed, and wrong:
+        # of .6 of the rating before or less, as a rule, and of .9 or more where it is right.
         least = 0.7 * paths[0].rating
         if plainer and any(path.rating > least for path in (plainer[0], *paths[1:])):
             (seen, lights), paths = others, plainer
