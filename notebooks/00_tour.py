@@ -195,8 +195,9 @@ for name, value, error in zip("xyz", law.offset, law.offset_errors, strict=True)
 
 # %% [markdown]
 # The true offset is (10, 10, 0). An axis along which no term becomes superfluous stays where it was, and
-# has no error. In the native frame, around that origin, fewest terms are left; the shift of a polynomial
-# is exact, so the one law follows from the other.
+# has no error. In the native frame, around that origin, fewest terms are left. The shift of a polynomial
+# is exact; what it leaves of terms that should cancel, here of a constant, is then set to zero in the cameras' frame, and the other
+# coefficients move with it by less than their errors.
 
 # %%
 fig = plots.plot_coefficients(law, shot.truth)

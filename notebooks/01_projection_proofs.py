@@ -133,6 +133,7 @@ R.round(4)
 # **The paper's text has it the other way round.** It sets $\mathbf v_0 = \mathbf e_z$ and
 # $\mathbf v_1 = \mathbf n$ and defines $\mathbf v_1 = \mathbf R\mathbf v_0$: that rotation takes
 # $\mathbf e_z$ to the normal. It is the transpose of ours, and it does not turn the plane flat.
+# Its appendix A says both: $\mathbf v_1 = \mathbf R\mathbf v_0$, and that the normal is rotated to $(0, 0, 1)^T$, which is what is needed.
 
 # %%
 text = R.T  # the rotation of the text
@@ -270,8 +271,8 @@ assert abs(np.linalg.det(proof) - 1) > 1e-3
 assert abs((proof @ n)[0]) < 1e-12
 
 # %% [markdown]
-# The expansion of $x_{rp}$ collects the coefficient of D and finds zero, which is right, but for
-# the axis $\mathbf n\times\mathbf e_z$. With the axis of the text, $\mathbf e_z\times\mathbf n$, it is not.
+# The expansion of $x_{rp}$ collects the coefficient of D and finds zero. That is right for
+# the axis $\mathbf n\times\mathbf e_z$, and wrong for the axis of the text, $\mathbf e_z\times\mathbf n$.
 
 
 # %%

@@ -411,8 +411,9 @@ caption = f"Error of Lorenz' coefficients at {level:.0%} noise against the physi
 save_figure("solver_nodes", fig, caption=caption, numbers=errors)
 
 # %% [markdown]
-# *In the middles of the spans the law may hold exactly, and the error falls with the weight (blue). At random times, or
-# at more of them, no cubic piece can: there is a best weight, and beyond it the law is bent to what pieces can do.
+# *In the middles of the spans the law may hold exactly, and the error falls with the weight (blue). At more times
+# than control points no cubic piece can: there is a best weight, and beyond it the law is bent to what pieces can do. At one random
+# time a span it can, but between these the law is met less well.
 # Who asks more often has to ask more softly, and tune how softly.*
 #
 # ## Gaps

@@ -458,7 +458,7 @@ for s in np.geomspace(0.001, 1, 13):
     print(f"{s:6.3f} of the spread tolerated: {terms.sum():2d} terms{remark}")
 
 # %% [markdown]
-# At a thousandth many terms pay; with every step up some go, until those remain that make the motion. They stay
+# At a thousandth many terms pay; as more is tolerated they go, until those remain that make the motion. They stay
 # over more than a decade. Such a range of tolerated errors, over which the terms stay the same, is a *plateau*.
 # `discover` begins with a law at a large tolerated error, takes the widest plateau of the path around it, equation by
 # equation, fits the law with its terms alone, and follows the path around that law again, until it leads nowhere
@@ -627,7 +627,7 @@ save_figure("solver_errors", fig, caption=caption, numbers=numbers)
 #
 # ## When it fails
 #
-# It does, if samples are too far apart, noise too high, or the library does not hold the law. What
+# It does, if noise is too high or the library does not hold the law; samples that are far apart bring doubts first. What
 # matters then is whether it says so: `Discovery.status` is "ok", or "suspect" with `warnings` that tell why.
 # Three sweeps around one setting: 300 samples, 50 a period, 10 % noise, library up to degree 3.
 

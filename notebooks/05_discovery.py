@@ -27,7 +27,7 @@
 # * the paper's own optimiser, **spline-ADO**, beside **Gauss-Newton**, which this package uses for the same model,
 #   and beside PySINDy, E-SINDy, WeakSINDy and Model-A;
 # * all of it from a learned detector's tracks in whole pixels, which is the paper's regime, with sub-pixel tracks as
-#   an upper bound.
+#   what a better tracker gives.
 #
 # **Afterwards you can** read the paper's main tables, and compare methods on equal terms.
 #
@@ -149,7 +149,7 @@ films = sweep(run_film, [FilmTask(name, n, frames) for name in names for n in tr
 # frame, to a tenth of a pixel or three.)
 #
 # `track` is more exact: its **sub-pixel** tracks are read to a thousandth of a pixel from clean and lossless
-# videos. What a method makes of those is an upper bound, of no use in a comparison with the paper.
+# videos. What a method makes of those is of no use in a comparison with the paper, and says what the tracker costs.
 #
 # All methods get the same paths in the reference frame, and the same 20 candidate terms:
 #
@@ -203,7 +203,7 @@ results, bound = (
 def beside_paper(table, methods):
     rows = summary(results[results.method.isin(methods)], ["system", "method"])
     best = summary(bound[bound.method.isin(methods)], ["system", "method"])
-    rows["upper bound: l2 (e-2)"] = best["l2 (e-2)"]
+    rows["sub-pixel: l2 (e-2)"] = best["l2 (e-2)"]
     printed_as = rows.method.replace(["Gauss-Newton", "spline-ADO"], "Ours")
     printed = [SCORES.get((table, *key)) for key in zip(printed_as, rows.system, strict=True)]
     rows["paper: false positives"] = pd.array([p and p.false_positives for p in printed], "object")
@@ -211,8 +211,8 @@ def beside_paper(table, methods):
     return rows
 
 
-errors = dict.fromkeys(["l2 (e-2)", "least", "most", "upper bound: l2 (e-2)"], 0.2)
-caption = f"From the detector's tracks in whole pixels, {len(trials)} trials; upper bound: from sub-pixel tracks; 0.001 is 0.001 or less."
+errors = dict.fromkeys(["l2 (e-2)", "least", "most", "sub-pixel: l2 (e-2)"], 0.2)
+caption = f"From the detector's tracks in whole pixels, {len(trials)} trials; sub-pixel: from sub-pixel tracks; 0.001 is 0.001 or less."
 table_1 = beside_paper("Table 1", ("Gauss-Newton", "spline-ADO", "PySINDy"))
 save_table("table_1", table_1.to_dict("records"), caption=caption, tolerance=errors)
 
@@ -240,7 +240,7 @@ if full:
     assert right["detector", "Gauss-Newton"] >= 0.9
     assert right["detector", "spline-ADO"] >= 0.75
     assert middle[list(both_optimisers)].max() < 2e-3
-    assert middle["spline-ADO"] < 3 * middle["Gauss-Newton"]
+    assert middle[["spline-ADO", "Model-A"]].max() < 5 * middle["Gauss-Newton"]
     assert middle["PySINDy"] > 5 * middle["spline-ADO"]
     assert (ado["l2 (e-2)"] < ado["paper: l2 (e-2)"]).all()
     assert (plain[["NoseHoover", "WangSun"]] < 20).all()
@@ -343,9 +343,12 @@ for name, law in found.items():
 # %%
 pulled = {n: np.concatenate(list(group)) for n, group in ours.groupby("system", sort=False).pulls}
 every = np.concatenate(list(pulled.values()))
+within = {name: np.mean(np.abs(group) < 2) for name, group in pulled.items()}
 print(f"{len(every)} coefficients, {np.mean(np.abs(every) < 2):.0%} within two standard errors")
+print("by system:", ", ".join(f"{name} {share:.0%}" for name, share in within.items()))
 if full:
-    assert 0.7 < np.mean(np.abs(every) < 2) < 0.95
+    assert 0.9 < np.mean(np.abs(every) < 2) < 0.98
+    assert min(within.values()) < 0.9 < 0.99 < max(within.values())
 
 # %% jupyter={"source_hidden": true} tags=["hide-input"]
 fig, axes = plt.subplots(figsize=(8, 3.8))
@@ -479,12 +482,12 @@ save_figure("fig_2", fig, caption=caption, numbers=numbers)
 #   <!-- by: right["detector", "Gauss-Newton"] >= 0.9; right["detector", "spline-ADO"] >= 0.75; right["sub-pixel", "spline-ADO"] == 1; middle[list(both_optimisers)].max() < 2e-3 -->
 # * The offset of the reference frame was not given and is found with the law.
 #   <!-- by: np.allclose(law.offset, REFERENCE_OFFSET -->
-# * The standard errors are a little too small here, for the errors of a detector are not all told by the tracks: fewer than 95 % of
-#   the coefficients lie within two of them, more than 70 %.
-#   <!-- by: 0.7 < np.mean(np.abs(every) < 2) < 0.95 -->
-# * On such tracks the two optimisers are alike, and Model-A errs little more in the median. PySINDy and E-SINDy err by per cents, which
-#   is what their finite differences cost. What sets the optimisers apart is noise.
-#   <!-- by: middle["spline-ADO"] < 3 * middle["Gauss-Newton"]; middle["PySINDy"] > 5 * middle["spline-ADO"]; 06: noisy["Gauss-Newton"] > noisy.drop("Gauss-Newton").max() + 0.2 -->
+# * Nineteen of twenty coefficients lie within two standard errors, as they should; by system fewer or more, for the errors of a
+#   detector are not all told by the tracks.
+#   <!-- by: 0.9 < np.mean(np.abs(every) < 2) < 0.98; min(within.values()) < 0.9 < 0.99 < max(within.values()) -->
+# * On such tracks spline-ADO and Model-A err up to five times as much as Gauss-Newton in the median. PySINDy and E-SINDy err by per
+#   cents, which is what their finite differences cost. What sets the optimisers far apart is noise.
+#   <!-- by: middle[["spline-ADO", "Model-A"]].max() < 5 * middle["Gauss-Newton"]; middle["PySINDy"] > 5 * middle["spline-ADO"]; 06: noisy["Gauss-Newton"] > noisy.drop("Gauss-Newton").max() + 0.2 -->
 #
 # **What the paper says and what we found.**
 #

@@ -129,8 +129,9 @@ assert all(row["error / noise of 10 %"] < 0.02 for row in rows)
 save_table("study_noise", rows, caption=caption, tolerance=loose)
 
 # %% [markdown]
-# What tracking and cameras leave behind is a small fraction of the noise that follows. From here
-# on, the errors are those of the regression; the last section checks this again by its results.
+# These paths are those of sub-pixel tracks, and what tracking and cameras leave behind is a small fraction of the noise that
+# follows; the last section checks this again by its results. The tracks of the detector that come first, in whole pixels, are off
+# by half a pixel: what that costs the clean rows show.
 #
 # ## One trial
 #
@@ -488,7 +489,7 @@ print(within.agg(["mean", "size"]).to_string(float_format="{:.0%}".format))
 assert (within.mean() >= 0.95).all()
 
 # %% [markdown]
-# Up to 20 % noise (Tsucs2: 10 %), 50 % in blocks and 20 % in fibers, hardly a law is wrong.
+# Up to 20 % noise, 50 % in blocks and 20 % in fibers, hardly a law is wrong, but of Tsucs2: of its laws, 10 % of noise takes three in five.
 #
 # ## Where it fails, and why
 #
@@ -605,7 +606,8 @@ save_figure("study_pulls_figure", fig, caption=caption, numbers=pulled)
 # %% [markdown]
 # *How far the coefficients of exact laws are from the truth. Those of one law move together, as
 # they share one path and one offset, so the curves are rougher than their number of points
-# suggests.*
+# suggests. What the error bars "promise" is the error of a law all of whose coefficients are off by one of them; where coefficients
+# move together, most laws are nearer than that.*
 
 # %%
 if full:
@@ -696,9 +698,9 @@ for row in rows:
 #   <!-- by: noisy["Gauss-Newton"] > noisy.drop("Gauss-Newton").max() + 0.2; 2 * seconds["Gauss-Newton"] < seconds["spline-ADO"] -->
 # * With 20 % noise the cameras cannot be learned from the tracks of SprottE, and no method has a path.
 #   <!-- by: no_path == {"SprottE"} -->
-# * Gauss-Newton doubts about a third of the exact laws of this regime, for the errors of the detector are no noise and the views say so.
+# * Gauss-Newton doubts about a quarter of the exact laws of this regime, for the errors of the detector are no noise and the views say so.
 #   <!-- by: 0.2 < doubted_here < 0.5 -->
-# * Gaps in exact samples cost next to nothing.
+# * Gaps in exact samples cost SprottF next to nothing.
 #   <!-- by: gaps.exact.all(); (gaps.l2 < 1e-4).all() -->
 # * The limit is information, and the Cramér-Rao bound knows it in advance: Tsucs2 has one term that
 #   noise of 10 % buries.
@@ -706,7 +708,7 @@ for row in rows:
 # * Error bars hold under noise for laws with the right terms. A law that fits as well as the truth
 #   carries no warning, even if it is wrong.
 #   <!-- by: row["within 2 (%)"] > 80; figure study_verdicts -->
-# * Videos and cameras add nothing to these errors that could be seen.
+# * Videos and cameras add nothing to these errors that could be seen, if tracks are known to a fraction of a pixel.
 #   <!-- by: row["l2, videos (e-2)"] < 0.05 * videos; abs(videos - truth) <= 0.2 -->
 #
 # **What the paper says and what we found.**

@@ -221,8 +221,8 @@ numbers = {title: view.track.confidence for title, view in zip(titles, first.vie
 save_figure("scene_confidence", fig, caption=caption, numbers=numbers)
 
 # %% [markdown]
-# *Where the tree hides the target (white between the grey), the confidence is nil. It is low for partial
-# views, and it varies with the noise even where all of the target is seen.*
+# *Where the tree hides the target (white between the grey), or shows a part of it only, the confidence is nil; of whole views it is
+# nearly one.*
 
 # %%
 def delays(view):
@@ -333,7 +333,7 @@ save_figure(
 
 # %% [markdown]
 # *How far each coefficient is from the truth, with its standard error. They lean together, for a small
-# error of the learned cameras is one error of all coefficients; the standard errors allow for it.*
+# error of the learned cameras is one error of all coefficients.*
 
 # %%
 rows = [

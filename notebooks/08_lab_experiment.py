@@ -109,7 +109,7 @@ velocities = np.array([(50.0, 170.0), (-220.0, 130.0), (240.0, -80.0)])  # and h
 
 
 def rolling(frames):
-    """Centre of the ball on three straight paths, on which its weight slows it down by 60 mm/s^2."""
+    """Centre of the ball on three straight paths, on which rolling friction slows it down by 60 mm/s^2."""
     t = (np.arange(frames)[:, None] - frames // 2) / FPS
     x = np.full((3, frames, 3), RADIUS)
     for path, middle, velocity in zip(x, middles, velocities, strict=True):

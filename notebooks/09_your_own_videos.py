@@ -568,11 +568,11 @@ for name, (law, x0, step, asked) in pair.items():
     print(both, "\n")
 
 
-caption = "Two targets in three films: one law for both, and who drives whom."
-save_table("own_two_targets", rows, caption=caption, tolerance={"l2": 0.2})
 assert all(row["exact"] and row["l2"] < 1e-3 for row in rows)
 assert "2 drives 1" in seen["springs"].driven
 assert not full or seen["Lorenz"].driven == "1 moves independently; 1 drives 2 by x1 in dx4/dt"
+caption = "Two targets in three films: one law for both, and who drives whom."
+save_table("own_two_targets", rows, caption=caption, tolerance={"l2": 0.2})
 
 # %% [markdown]
 # *Two targets: all true terms and no other, and the direction of the drive.*

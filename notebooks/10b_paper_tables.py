@@ -166,7 +166,7 @@ save_figure("audit_l2_figure", fig, caption=caption, numbers=differences)
 
 # %% [markdown]
 # *Distance between the errors of Table 1 and those of the equations of Table S2, over what rounding can
-# explain (at least 0.01 is drawn). The farthest, WangSun, comes back as soon as 82.27 is read as the coefficient of z.*
+# explain (at least 0.001 is drawn). The farthest, WangSun, comes back as soon as 82.27 is read as the coefficient of z.*
 
 # %%
 unexplained = {name for name, value in differences.items() if value > 1}
@@ -180,8 +180,8 @@ tsucs = next(row for row in rows if row["system"] == "Tsucs2" and row["method"] 
 assert differences["NoseHoover, PySINDy"] < 1.5  # 824.44 beside 824.47
 
 # %% [markdown]
-# The scores are said to be averages over five trials. That ten of fourteen are, to the last digit, the
-# score of *one* printed law leaves two readings: they are the scores of one trial, or the trials hardly
+# The scores are said to be averages over five trials. That ten of fourteen are, within the
+# rounding of its coefficients, the score of *one* printed law leaves two readings: they are the scores of one trial, or the trials hardly
 # differed. No spread is given; for clean videos the second is well possible.
 
 # %%
@@ -193,7 +193,7 @@ note("Table 1", "l2 of SprottF (own method), Tsucs2 (PySINDy)", "not those of Ta
      f"{sprott['l2 recomputed (e-2)']:.2f} for {sprott['l2 printed (e-2)']:.2f}, "
      f"{tsucs['l2 recomputed (e-2)']:.2f} for {tsucs['l2 printed (e-2)']:.2f}", "hardly")
 note("Sec. 4.1", "results are averaged over five trials",
-     "most errors are, to the last digit, those of one printed law",
+     "most errors are, within rounding, those of one printed law",
      f"{agree} of {len(rows)} rows", "no spread is known")  # fmt: skip
 
 # %% [markdown]
@@ -547,9 +547,9 @@ for name in SYSTEMS:
         "l2 in its coordinates (e-2)": 100 * fitted.misfit, "rounding (e-2)": 100 * reach,
         "explained": "entirely" if fitted.misfit < reach else "open",
     })  # fmt: skip
-save_table("audit_coordinates", rows, caption="How much of l2 is left in stretched, shifted axes.")
 explained = {row["system"] for row in rows if row["explained"] == "entirely"}
 assert explained == {"SprottF", "NoseHoover", "WangSun"}
+save_table("audit_coordinates", rows, caption="How much of l2 is left in stretched, shifted axes.")
 
 # %% [markdown]
 # This is what the paper itself suspects ("potential errors in learning such a relationship"). But it does not

@@ -168,7 +168,7 @@ if full:
     assert not ours["wrong, ok"].any()
 
 # %% [markdown]
-# Least squares finds about half of these laws even without errors: a threshold on coefficients keeps what is large,
+# PySINDy finds about half of these laws even without errors: a threshold on coefficients keeps what is large,
 # not what is needed. The smooth error of the stored integration, of the order of $10^{-4}$, costs each method two laws
 # at most, and what Gauss-Newton finds in their place comes with a doubt. It looks like small terms to a solver that takes errors for white noise; Gauss-Newton looks for the law that *persists* while more and more error is tolerated ([notebook 04b](04b_the_search.ipynb)); `found.plot_path()`
 # draws that.
@@ -183,7 +183,7 @@ save_figure("score_path", fig, caption=caption, numbers=dict(zip("xy", path, str
 
 # %% [markdown]
 # *The Brusselator, as stored. Where nothing is tolerated (left), the law has terms that imitate the
-# integrator; they go one by one, and the plateau that lasts (orange) is the law.*
+# integrator; they go as more is tolerated, and the plateau that lasts (orange) is the law.*
 #
 # ### Equations that are no cubic polynomial
 #
@@ -390,6 +390,13 @@ save_table("table_solver_ablation", apart.reset_index().to_dict("records"), capt
 # %% [markdown]
 # *A mechanism whose row does not differ from the first one does not show in these contests.*
 #
+# Most are explained in [notebook 04b](04b_the_search.ipynb): the *support path*, along which the tolerated error falls, the *first
+# tolerance* at which it begins, *process noise* and the *free offset*. The others: the *second start* seeks the first law again
+# where the path leads to none; *richer laws* are tried below the plateau; the *floor for smooth errors* keeps the path from errors
+# that last for many samples, which the *integrated autocorrelation time* counts as fewer; *errors of the times* are those of a clock; the
+# *weights from the smoother* are how noisy each coordinate is before any law is known, and *noise told by all terms* is that with
+# every term of the library in use.
+#
 # ## How far can the status be trusted?
 #
 # All contests of this page together.
@@ -441,7 +448,7 @@ if full:
 # * The status "ok" can be trusted in more than five cases of six; "suspect" also falls on laws that are exact, on the Lorenz grid more
 #   than twice as often as with the flows.
 #   <!-- by: trusted.exact.mean() > 0.85; grid_row["doubted of the exact (%)"] > 2 * flow_row["doubted of the exact (%)"] -->
-# * Published rates of SINDy need thresholds that know the truth: with such an oracle it is far above PySINDy as a user has it.
+# * With thresholds that know the truth SINDy is far above PySINDy as a user has it.
 #   <!-- by: row["SINDy, oracle, here"] > row["PySINDy, here"] + 10; figure score_r2 -->
 # * Whether a law is outside the library, one record cannot always say. Then the status is ok and the law an
 #   approximation.

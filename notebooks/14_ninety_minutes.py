@@ -78,7 +78,7 @@ save_figure("ninety_tracks", fig, caption=caption, numbers={f"camera {i + 1}": t
 # %% [markdown]
 # ## 2. A camera is two rows of a matrix (10 minutes)
 #
-# A camera that looks along its normal $\mathbf n$ has two axes in its picture, and they are the rows of a matrix
+# A camera whose picture lies in the plane across $\mathbf n$ has two axes in it, and they are the rows of a matrix
 # $\mathbf R^-$. A point $\mathbf x$ is seen at $\mathbf R^-\mathbf x$: two numbers, and the third, the depth, is lost. Then the
 # camera's place is taken off, the picture is turned by an angle $\vartheta$, and divided by the size $s$ of a pixel.
 
@@ -184,7 +184,7 @@ save_figure("ninety_slopes", fig, caption=caption, numbers=numbers)
 # ## 5. Few terms out of many (20 minutes)
 #
 # Suppose that $\mathbf f$ is a sum of monomials up to degree two. There are ten candidates, and least squares gives each of them
-# a coefficient, 30 numbers in all. Hardly one is zero.
+# a coefficient, 30 numbers in all. None of them is zero.
 
 # %%
 def candidates(path):
@@ -294,7 +294,7 @@ assert short.status == "suspect"
 #   <!-- by: short.status == "suspect" -->
 #
 # **What the paper says and what we found.** The paper adds an offset to its curve, which changes nothing as it is written, and
-# does not say what its two weights are; notebook [04](04_spline_ado.ipynb) has both. The steps are those of this lecture.
+# does not say what its two weights are; [04](04_spline_ado.ipynb) has the offset, [06](06_robustness_and_ablation.ipynb) the weights. The steps are those of this lecture.
 # <!-- by: scored.terms_found; scored.l2 < 0.02 -->
 
 # %% [markdown]

@@ -82,7 +82,7 @@ print("right")
 # %% [markdown]
 # **3.** (Prove.) The law has a frame of its own in which it is shortest. Show that a polynomial law of degree $p$
 # keeps its degree under any shift of the origin, and that its terms of degree $p$ do not change at all. Which two
-# terms of Lorenz' law are the same in every frame? Set `answer` to a string of the two, in alphabetical order, such
+# terms of Lorenz' law does that hold for? Set `answer` to a string of the two, in alphabetical order, such
 # as `"x,y"`.
 
 # %% tags=["solution"]

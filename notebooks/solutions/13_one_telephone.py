@@ -41,8 +41,8 @@ flight = discover_from_video(film, length=stick)
 print(flight.g)
 
 # %% [markdown]
-# **1.** (Prove.) Somebody films in slow motion, at 120 frames a second, and the file says 30. By what factor is $g$
-# wrong? Set `factor`. (Then see what `discover_from_video(film, length=stick, fps=7.5)` makes of the film above,
+# **1.** (Prove.) Somebody films in slow motion, at 120 frames a second, and the file says 30. Set `factor` to the
+# $g$ that comes out over the true one. (Then see what `discover_from_video(film, length=stick, fps=7.5)` makes of the film above,
 # which says that it has a quarter of its frames a second.)
 
 # %% tags=["solution"]

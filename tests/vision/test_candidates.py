@@ -54,12 +54,12 @@ def test_what_touches_the_border_of_the_image_is_worth_less_and_a_shadow_half(le
 def test_shadows_are_darker_by_about_the_same_factor_in_all_colours():
     ground = np.array([100, 150, 200.0])
     for share, is_shadow in ((0.3, False), (0.4, True), (0.6, True), (0.9, True), (0.98, False)):
-        assert shadowed(share * ground[None], ground[None], 0.1).item() == is_shadow
+        assert shadowed(share * ground[None], ground[None]).item() == is_shadow
     coloured = ground * [0.55, 0.65, 0.6]
-    assert not shadowed(coloured[None], ground[None], 0.1).item()
+    assert not shadowed(coloured[None], ground[None]).item()
     # The darker the ground, the less its colours tell.
-    assert shadowed(np.array([[3, 10, 3.5]]), np.array([[6, 16, 6.0]]), 0.1).item()
-    assert not shadowed(10 * np.array([[3, 10, 3.5]]), 10 * np.array([[6, 16, 6.0]]), 0.1).item()
+    assert shadowed(np.array([[3, 10, 3.5]]), np.array([[6, 16, 6.0]])).item()
+    assert not shadowed(10 * np.array([[3, 10, 3.5]]), 10 * np.array([[6, 16, 6.0]])).item()
 
 
 FRAMES = np.arange(30)

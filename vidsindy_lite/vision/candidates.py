@@ -232,8 +232,10 @@ def candidates(
         allowed = plate.laid(bound, here, borderValue=1e3)
         lit = light(frame, ground, known)
         lights.append(lit)
-        differs = lengths(changes(frame, ground, lit))
-        witnesses = [(differs / allowed * known, 1.0)]
+        strength = lengths(changes(frame, ground, lit)) / allowed * known
+        lighter, some = strength.copy(), strength > 1  # without shadows
+        lighter[some] = np.where(shadowed(frame[some], ground[some] * lit), 1, strength[some])
+        witnesses = [(strength, 1.0), (lighter, 1.0)]
         if others:
             witnesses.append((_from_neighbours(frame, others, plate.moves) / allowed, 0.7))
         one = _distinct(Candidates.joined(
@@ -321,7 +323,7 @@ def components(
     quality = worth * np.tanh(mean / 4) * np.minimum(area / (0.7 * box[:, 2:].prod(axis=1)), 1)
     quality *= np.minimum(area / 8, 1)
     cut = (box[:, :2] <= 0).any(axis=1) | (box[:, :2] + box[:, 2:] >= mask.shape[::-1]).any(axis=1)
-    quality *= np.where(cut, 0.6, 1) * np.where(shadowed(colour, behind, 0.1), 0.5, 1)
+    quality *= np.where(cut, 0.6, 1) * np.where(shadowed(colour, behind), 0.5, 1)
     first = np.zeros(len(order), int)
     return Candidates(first, centre, centre, box, area, colour, behind, quality)
 

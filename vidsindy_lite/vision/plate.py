@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .video import Reel
 
+_UNEVEN = 0.12  # share by which a shadow may darken the colours of a pixel unlike each other
 _STRIP = 64  # rows of an image that are sorted at once: what they need stays in the cache
 
 
@@ -32,15 +33,12 @@ def lengths(a: Floats32) -> Floats32:
     return np.sqrt(dot(a, a))
 
 
-def shadowed(now: Floats | Floats32, ground: Floats | Floats32, uneven: float) -> Bools:
-    """Where (...) the same surface is seen in less light: darker by the same in all colours.
-
-    By how much these factors may be `uneven`: of means by less than of noisy pixels.
-    """
-    r, g, b = np.moveaxis((now + 4) / (ground + 4), -1, 0)  # faster than along a short axis
+def shadowed(now: Floats | Floats32 | Image, ground: Floats | Floats32) -> Bools:
+    """Where (...) the same surface is seen in less light: darker by the same in all colours."""
+    r, g, b = np.moveaxis((now + 4.0) / (ground + 4.0), -1, 0)  # faster than along a short axis
     mean = (r + g + b) / 3
     apart = np.maximum(np.maximum(r, g), b) - np.minimum(np.minimum(r, g), b)
-    return np.asarray((mean > 0.35) & (mean < 0.95) & (apart < uneven * mean))
+    return np.asarray((mean > 0.35) & (mean < 0.95) & (apart < _UNEVEN * mean))
 
 
 def relit(image: Image, factor: Floats32) -> Floats32:

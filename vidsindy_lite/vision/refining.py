@@ -32,7 +32,6 @@ from scipy.spatial.distance import cdist
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .plate import Plate, dot, least_difference, lengths, relit, shadowed, tolerance
 
-_UNEVEN = 0.12  # share by which a shadow may darken the colours of a pixel unlike each other
 _AROUND = 9  # views around one that say how large it should be
 _MOSTLY = 0.8  # share of the views that must show it whole
 _BESIDE = 5  # views before and after a change of size, which show how large it was and is
@@ -96,9 +95,12 @@ class Lens:
         # What is of another colour, e.g. a shadow or a hand: off the line from ground to target.
         off = miss >= np.maximum(0.45 * np.sqrt(square), 2 * self.least)
         own = mask & (share > 0.25) & ~off
-        # Where half of it over the ground would look like one, nothing is told from a shadow.
-        dark = shadowed(ground + smooth, ground, _UNEVEN)
-        own &= ~dark | shadowed(ground + np.float32(0.5) * contrast, ground, _UNEVEN)
+        # A shadow is nearer to the line from ground to black than to that from ground to target.
+        dark = shadowed(ground + smooth, ground)
+        less = dot(smooth, ground) / (dot(ground, ground) + 1)
+        dark &= miss > lengths(np.asarray(smooth - less[..., None] * ground)) + self.least
+        own &= ~dark
+        change[dark] = 0
         label = _nearest(own, centre - low)
         view = label if label is None else self._measure(label, change, contrast, low, now)
         if label is None and (label := _nearest(mask, centre - low)) is None:
@@ -160,7 +162,9 @@ def _nearest(mask: Bools, centre: Floats) -> Bools | None:
         return None
     area = stats[1:, cv2.CC_STAT_AREA]
     apart = np.linalg.norm(centres[1:] - centre, axis=1)
-    return labels == 1 + int(np.argmax(area / (1 + (apart / (2 + np.sqrt(area))) ** 2)))
+    best = labels == 1 + int(np.argmax(area / (1 + (apart / (2 + np.sqrt(area))) ** 2)))
+    rims, _ = cv2.findContours(best.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    return cv2.drawContours(np.zeros(mask.shape, np.uint8), rims, -1, 1, cv2.FILLED) > 0
 
 
 def entire(views: Sequence[View | None]) -> tuple[list[View | None], tuple[str, ...]]:
@@ -323,7 +327,7 @@ def whole(
     another colour; None if it is not one compact thing. Not all that `differs` has an `other`
     colour: what lies between ground and target is its blur.
     """
-    shadow = shadowed(now, ground, _UNEVEN)
+    shadow = shadowed(now, ground)
     mask = (own | (differs & ~shadow)).astype(np.uint8)
     _, labels = cv2.connectedComponents(np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, _CORE)))
     inside = np.bincount(labels[own], minlength=2)

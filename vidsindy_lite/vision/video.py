@@ -643,10 +643,15 @@ class Reel:
             raise ValueError(f"path: must hold two frames or more, got one in '{path}'")
         width, height = self.info.size
         self.factor = -(-max(width, height) // longest) if longest else 1
-        self.whole = self if self.factor == 1 else Reel(path)
+        self._larger = None if self.factor == 1 else Reel(path)
         # Bytes of frames that are kept, whole or reduced.
         self.few = 3 * width * height * self.info.frames <= 300_000_000 * self.factor**2
         self._kept: list[Image] | None = None
+
+    @property
+    def whole(self) -> Reel:
+        """The film in frames that are not reduced."""
+        return self._larger or self
 
     def __iter__(self) -> Iterator[Image]:
         if self._kept is not None:
