@@ -278,11 +278,15 @@ def _observed(
                 affine = _concluded(raw, tracks, far.rig, far.lags, clock, [], warnings, far.places)
                 if len(far.variance) < 3:  # parallel projections of a plane tell of no lens
                     return affine
-            try:
-                rig = cameras.posed(films.aligned, rig, lags is not None)
-            except ValueError:
+            for begun in (films.lags,) if far is None else (films.lags, far.lags.frames):
+                try:
+                    rig = cameras.posed(replace(films, lags=begun).aligned, rig, lags is not None)
+                    break
+                except ValueError as error:
+                    failed = error
+            else:
                 if affine is None:
-                    raise
+                    raise failed
                 return affine
     first = list[str]()
     mistake = None if synchronous else cameras.find_mistake(films, rig, names)

@@ -259,7 +259,7 @@ def factorised(films: Footage, rig: Rig, synchronous: bool = False) -> Factorise
     moved, missed = (
         np.nanmean((_beyond(images, r) ** 2).reshape(-1, count, 2), axis=(0, 2)) for r in (0, rank)
     )
-    left = float(np.sqrt(missed.mean() / (1 - rank / (2 * count))))
+    left = _left(films, best, range(count), rank)
     # Times what is left by which a target must move, rms, in every view.
     if not (moved > 5.0**2 * missed).all():
         return None
@@ -268,10 +268,12 @@ def factorised(films: Footage, rig: Rig, synchronous: bool = False) -> Factorise
     downs = np.split(np.sqrt(count) * axes[:3].T, count)
     places, shapes = np.split(middle, count), [camera.image_size for camera in rig.cameras]
     cameras = tuple(map(AffineCamera.of, downs, places, shapes))
-    doubts = []
-    if left > GROSS:
+    doubts, steps = [], np.diff(_beyond(images, rank), axis=0)
+    noise = float(np.sqrt(np.nanmean(steps**2) / 2 / (1 - rank / (2 * count))))
+    if left > min(GROSS, max(ALIKE * noise, 10 * FINE)):  # what lasts is no noise
         doubts.append(
-            f"views agree on one motion but for {left:.2g} pixels of noise: look at the tracks"
+            f"views agree on one motion but for {left:.2g} pixels: noisy tracks, cameras too near "
+            "for parallel projections, or a view of another time or of something else"
         )
     if others and rank > 1:  # on a line the motion is the same, whole periods apart
         doubts.append(untold_lags([best, *others]))
@@ -287,12 +289,18 @@ def _least(footage: Footage) -> float:
 
 def _left(footage: Footage, lags: Floats, places: Sequence[int], rank: int) -> float:
     """Noise of the pixels that is left beyond a rank; infinite of too few common frames."""
-    beyond = _beyond(_images(footage, lags, places), rank)
-    count, width = np.isfinite(beyond[:, 0]).sum(), beyond.shape[1]
+    images = _images(footage, lags, places)
+    count = np.isfinite(images).all(axis=1).sum()
     step = footage.span / max(len(footage.instants) - 1, 1)
-    if count <= width or count * step < _least(footage):
+    if count <= images.shape[1] or count * step < _least(footage):
         return np.inf
-    return float(np.sqrt(np.nansum(beyond**2) / (count * (width - rank))))
+    beyond = _beyond(images, rank)
+    return float(np.sqrt(np.nansum(beyond**2) / _freedom(beyond, rank)))
+
+
+def _freedom(beyond: Floats, rank: int) -> int:
+    """How many of these numbers are free."""
+    return int(np.maximum(np.isfinite(beyond).sum(axis=1) - rank, 0).sum())
 
 
 def _best(
@@ -343,15 +351,14 @@ def _polished(footage: Footage, lags: Floats, rank: int) -> tuple[Floats, Floats
 
     def beyond(others: Floats) -> Floats:
         late = np.append(0.0, others)
-        return np.nan_to_num(_beyond(_images(footage, late, range(count)), rank)).ravel()
+        return _beyond(_images(footage, late, range(count)), rank)
 
-    found = least_squares(beyond, lags[1:], diff_step=1e-3, max_nfev=_STEPS)
-    left, errors = found.fun.reshape(-1, 2 * count), np.full(count - 1, np.inf)
+    found = least_squares(lambda others: np.nan_to_num(beyond(others)).ravel(), lags[1:],
+                          diff_step=1e-3, max_nfev=_STEPS)  # fmt: skip
+    left, errors = beyond(found.x), np.full(count - 1, np.inf)
     information = found.jac.T @ found.jac
     if np.linalg.cond(information) <= 1 / np.finfo(float).eps:
-        seen = left.any(axis=1)
-        tau = lasting(np.where(seen[:, None], left, np.nan))
-        variance = tau * np.sum(left**2) / (seen.sum() * (2 * count - rank))
+        variance = lasting(left) * np.nansum(left**2) / _freedom(left, rank)
         errors = np.sqrt(variance * np.diag(np.linalg.inv(information)))
     return np.append(0.0, found.x), np.append(0.0, errors)
 
@@ -370,8 +377,16 @@ def _spread(images: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _beyond(images: Floats, rank: int) -> Floats:
-    """These rows without their middle and so many of the axes; NaN where a view is missing."""
+    """What rows differ from their middle beyond so many of the axes; NaN where none or one sees.
+
+    Two views contradict a lag as well as all, and a chance that all agree in few frames.
+    """
     middle, _, axes = _spread(images)
-    centred = images - middle
-    centred[np.isnan(centred).any(axis=1)] = np.nan
-    return centred - centred @ axes[:rank].T @ axes[:rank]
+    seen, left = np.isfinite(images), np.full_like(images, np.nan)
+    for shown in np.unique(seen, axis=0):
+        if shown.sum() >= 4:
+            part = np.ix_((seen == shown).all(axis=1), shown)
+            along, _ = np.linalg.qr(axes[:rank, shown].T)
+            off = (images - middle)[part]
+            left[part] = off - off @ along @ along.T
+    return left
