@@ -8,9 +8,10 @@ import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import combinations_with_replacement
 from math import comb
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -84,7 +85,7 @@ class Function:
     @classmethod
     def unknown(cls, name: str) -> Function:
         """A function of which nothing but the name is known: NaN everywhere."""
-        return cls(name, name, lambda x: np.full(len(x), np.nan), (0,))
+        return cls(name, name, _unknown, (0,))
 
     @property
     def of_time(self) -> bool:
@@ -105,6 +106,10 @@ class Function:
             far = self.value(x + 2 * step) - self.value(x - 2 * step)
             result[:, axis] = (8 * near - far) / (12 * step[axis])
         return result
+
+
+def _unknown(x: Floats) -> Floats:
+    return np.full(len(x), np.nan)
 
 
 def extended(x: Floats, functions: Sequence[Function]) -> Floats:
@@ -704,8 +709,12 @@ def harmonic(names: tuple[str, ...], axis: int, multiple: int, kind: str) -> Fun
     """Sine or cosine of a multiple of a coordinate."""
     times, of = "" if multiple == 1 else f"{multiple} ", {"sin": np.sin, "cos": np.cos}[kind]
     latex = rf"\{kind}({times}{name_latex(names[axis])})"
-    value = lambda x: of(multiple * x[:, axis])  # noqa: E731
+    value = partial(_harmonic, of=of, multiple=multiple, axis=axis)
     return Function(f"{kind}({times}{names[axis]})", latex, value, (axis,))
+
+
+def _harmonic(x: Floats, of: np.ufunc, multiple: int, axis: int) -> Floats:
+    return np.asarray(of(multiple * x[:, axis]))
 
 
 def own(
@@ -731,11 +740,9 @@ def own(
     used = {argument: inputs[argument] for argument in arguments if argument in inputs}
     used |= {name: rule} if isinstance(rule, Input) else {}
 
-    def evaluate(x: Floats) -> Floats:
-        values = dict(zip(names, x.T, strict=True))
-        values |= {known: of_time(values[CLOCK]) for known, of_time in inputs.items()}
-        with np.errstate(all="ignore"):  # what is not finite is refused where it matters
-            return np.asarray(rule(*(values[argument] for argument in arguments)), dtype=float)
+    columns = [names.index(CLOCK) if a in inputs else names.index(a) for a in arguments]
+    known = [inputs.get(argument) for argument in arguments]
+    evaluate = partial(_evaluated, rule=rule, columns=columns, known=known)
 
     try:
         shape, longer = (evaluate(np.ones((n, len(names)))).shape for n in (2, 97))
@@ -756,10 +763,23 @@ def own(
         of = names[j]
         return replace(
             whole, name=f"{name}_{of}", latex=f"{latex}_{{{of}}}", direction=j,
-            value=lambda x: evaluate(x)[j],
+            value=partial(evaluate, part=j),
         )  # fmt: skip
 
     return [whole] if len(shape) == 1 else [component(j) for j in range(measured)]
+
+
+def _evaluated(
+    x: Floats,
+    rule: Callable[..., ArrayLike],
+    columns: Sequence[int],
+    known: Sequence[Input | None],
+    part: Any = ...,
+) -> Floats:
+    """A function of one's own, or a component, of columns of points and of inputs at such."""
+    values = [x[:, k] if of is None else of(x[:, k]) for k, of in zip(columns, known, strict=True)]
+    with np.errstate(all="ignore"):  # what is not finite is refused where it matters
+        return np.asarray(rule(*values), dtype=float)[part]
 
 
 def _arguments(rule: Callable[..., ArrayLike]) -> list[str]:
