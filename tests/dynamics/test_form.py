@@ -249,7 +249,7 @@ def test_an_error_of_scale_changes_error_bars_alone():
     assert told.standard_errors[product] == pytest.approx(expected, rel=0.3)
 
 
-RUNS, CURVE = [(T, X), (T, X)], np.ones((2, 200, 2))
+RUNS, CURVE = [(T, X), (T, -X)], np.ones((2, 200, 2))
 
 
 @pytest.mark.parametrize(
@@ -266,7 +266,9 @@ RUNS, CURVE = [(T, X), (T, X)], np.ones((2, 200, 2))
         ({"t": RUNS, "x": None, "sigma": [0.1] * 3}, "sigma: must be one per .*, got 3 for 2"),
         ({"origin": "here"}, "origin: must be one of learn, data, got 'here'"),
         ({"t": [(T, X), (T, X * [1, np.nan])], "x": None}, "in all trajectories or in none, got c"),
-        ({"t": [(T, frame("a", "b")), (T, frame("b", "a"))], "x": None}, "must be named alike in"),
+        ({"t": [(T, frame("a", "b")), (2 * T, frame("b", "a"))], "x": None}, "must be named alike"),
+        ({"t": [*RUNS, (T, X)], "x": None}, "must hold each run once, got trajectory 0 again as 2"),
+        ({"t": [(T, X), (999 * T, X)], "x": None}, "one unit in all .*, got median steps from "),
         ({"x": frame("a", "a")}, "x: columns must have names of their own, got .'a', 'a'."),
     ],
 )

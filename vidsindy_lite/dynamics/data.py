@@ -16,6 +16,7 @@ from ..checks import FARTHEST, check_array, check_items, check_times, shown
 
 #: Lag-1 autocorrelation, in standard errors of white noise, from which on errors are dependent.
 CHANCE = 4.0
+MOST_APART = 100.0  #: Median steps of runs over each other: beyond, one is in other units.
 #: Times (n,) and states (n, d), NaN where a coordinate was not seen; in each row one was.
 Trajectory = tuple[Floats, Floats]
 
@@ -84,7 +85,7 @@ def check_trajectories(
     ------
     ValueError
         If ``t`` is neither, or a trajectory is malformed: see `check_trajectory`; of these a row
-        is left out only if nothing was seen in it.
+        is left out only if nothing was seen in it. If one is there twice, or in other units.
     """
     pairs = t if x is None else [(t, x)]
     items = pairs if isinstance(pairs, list | tuple) else [pairs]
@@ -110,6 +111,16 @@ def check_trajectories(
         raise ValueError(
             f"x: a coordinate must be seen in all trajectories or in none, got column {column} "
             f"without a number in trajectory {int(seen[:, column].argmin())}"
+        )
+    runs = [(times.tobytes(), values.tobytes()) for times, values in trajectories]
+    for i, run in enumerate(runs):
+        if (first := runs.index(run)) < i:
+            raise ValueError(f"t: must hold each run once, got trajectory {first} again as {i}")
+    steps = [np.median(np.diff(times)) for times, _ in trajectories if len(times) > 1] or [1.0]
+    if max(steps) > MOST_APART * min(steps):
+        raise ValueError(
+            f"t: must have one unit in all trajectories, got median steps from {min(steps):g} to "
+            f"{max(steps):g}"
         )
     return trajectories
 
