@@ -87,6 +87,8 @@ def test_masked_entries_are_missing(dtype):
     assert type(values) is np.ndarray
     np.testing.assert_array_equal(values, [0, 1, np.nan, 3])
     assert masked.data.tolist() == [0, 1, 2, 3]
+    frame = pd.DataFrame({"a": [None, 1], "b": [0, 2]}, dtype=f"{dtype.__name__.title()}64")
+    np.testing.assert_array_equal(check_array("x", frame), [[np.nan, 0], [1, 2]])
 
 
 def test_messages_name_the_remedy():
@@ -103,6 +105,7 @@ def test_messages_name_the_remedy():
         ((t, x[:, 0]), r"got \(60,\): one coordinate is a column, x\[:, None\]"),
         (([(t, x), (t, x), (t, np.nan * x), (t, x)],), "60 rows of NaN, in trajectory 2"),
         ((t, pd.DataFrame({"time": t, "x": x[:, 0]})), "got the times as column 'time'"),
+        ((t, pd.DataFrame({"x": t, "q": "1"})), r"x: 'q' \(str\): must be an array of real numb"),
         ((t, np.full(x.shape, 10**5000, object)), "x: must be an array of real numbers"),
     ):
         with pytest.raises(ValueError, match=said):

@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..checks import FARTHEST, check_array, check_items, check_times, shown
+from ..checks import FARTHEST, check_array, check_items, check_times, labels, shown
 
 # --------------------------------------------------------------------------------------------------
 # Measured trajectories: checked input, and its cut into stretches without gaps.
@@ -116,7 +116,7 @@ def check_trajectories(
     for i, run in enumerate(runs):
         if (first := runs.index(run)) < i:
             raise ValueError(f"t: must hold each run once, got trajectory {first} again as {i}")
-    steps = [np.median(np.diff(times)) for times, _ in trajectories if len(times) > 1] or [1.0]
+    steps = [typical_step([run]) for run in trajectories if len(run[0]) > 1] or [1.0]
     if max(steps) > MOST_APART * min(steps):
         raise ValueError(
             f"t: must have one unit in all trajectories, got median steps from {min(steps):g} to "
@@ -148,15 +148,14 @@ def coordinate_names(pairs: Sequence[tuple[Floats, Floats]]) -> tuple[str, ...]:
             clock = str(name).lower() in ("t", "time", "times", "seconds", "timestamp")
             if clock and np.array_equal(frame[name], times):
                 raise ValueError(f"x: must hold states alone, got the times as column {name!r}")
-    if columns[0] and all(isinstance(name, str) and name.isidentifier() for name in columns[0]):
-        return tuple(columns[0])
-    return variable_names(np.shape(pairs[0][1])[1])
+    return tuple(labels(pairs[0][1])) or variable_names(np.shape(pairs[0][1])[1])
 
 
 def check_sigma(
     sigma: float | Floats | Sequence[float | Floats] | None,
     times: Sequence[Floats],
     trajectories: Sequence[Trajectory],
+    names: Sequence[str],
 ) -> list[Floats] | None:
     """Standard errors of samples as `discover` takes them, at those that are not missing.
 
@@ -167,6 +166,7 @@ def check_sigma(
     times : sequence of array_like, shape (n,)
         Of all samples of each trajectory, missing or not.
     trajectories : sequence of Trajectory
+    names : sequence of str, length d
 
     Returns
     -------
@@ -185,7 +185,7 @@ def check_sigma(
     check_items("sigma", given, len(trajectories), "trajectory")
     checked = []
     for part, t, (seen, x) in zip(given, times, trajectories, strict=True):
-        errors, shape = check_array("sigma", part), (len(t), x.shape[1])
+        errors, shape = check_array("sigma", part, names), (len(t), x.shape[1])
         if errors.shape not in ((), shape[1:], shape):
             raise ValueError(
                 f"sigma: must be a number, or have shape {shape[1:]} or {shape}, got {errors.shape}"

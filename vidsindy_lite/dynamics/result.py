@@ -346,16 +346,14 @@ class Discovery:
     def predict(self, x: Floats) -> Floats:
         """Time derivative at states, shape (n, d) or (d,), in units of the data.
 
-        The columns of a data frame may have any order, if they are named like the variables.
+        What is named like the variables, as columns of a data frame are, may have any order.
 
         Raises
         ------
         ValueError
-            If the states have another shape, or an input of the law is not known at their times.
+            If states have another shape or names, or an input is not known at their times.
         """
-        names = self.system.names
-        if set(names) <= set(getattr(x, "columns", ())):
-            x = cast("Any", x)[list(names)]
+        x = check_array("x", x, self.system.names)
         slopes = self.system(x)
         self.system.check_inputs(np.atleast_2d(x)[:, -1])
         return slopes
