@@ -1,6 +1,7 @@
 """The result: units, error bars, frames, texts, files, and a picture of its path."""
 
 import json
+from dataclasses import replace
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -9,7 +10,7 @@ from helpers import noisy
 
 import vidsindy_lite as vl
 from vidsindy_lite import Library, PolynomialSystem
-from vidsindy_lite.dynamics.result import Discovery, _with_error
+from vidsindy_lite.dynamics.result import Discovery, Step, _with_error
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study.corruption import add_correlated_noise
 
@@ -84,7 +85,10 @@ def test_a_law_predicts_slopes_and_paths(spring):
 
 def test_a_discovery_is_saved_and_loaded_digit_for_digit(spring, tmp_path):
     _, t, found = spring
+    history = (Step("", 1.0, np.nan, -np.inf, 2),)
+    found = replace(found, absent=found.absent * np.inf, history=history, note="NaN, Infinity")
     found.save(tmp_path / "law.json")
+    json.loads((tmp_path / "law.json").read_text(), parse_constant=pytest.fail)
     again = Discovery.load(tmp_path / "law.json")
     assert str(again) == str(found)
     assert again.equations("native") == found.equations("native")

@@ -3,7 +3,6 @@ file, and its path of laws as a picture."""
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import time
@@ -19,7 +18,7 @@ from tqdm import tqdm
 
 from ..arrays import Bools, Floats
 from ..checks import MALFORMED, check_array, check_choice, check_instance, check_output, shown
-from ..storage import check_file, read_tree, write_file
+from ..storage import check_file, read_tree, write_json
 from ..values import built, decoded, encoded
 from .bspline import smooth
 from .collocation import Fit, WithCurve
@@ -448,7 +447,7 @@ class Discovery:
             "functions": encoded(_values(self), str),
             "discovery": encoded(self, attrgetter("__name__"), (Function,)),
         }
-        write_file(file, f"{json.dumps(content, indent=1)}\n".encode())
+        write_json(file, content)
 
     @staticmethod
     def load(path: str | os.PathLike, library: Library | None = None) -> Discovery:
