@@ -33,6 +33,8 @@ def test_terms_are_read_in_any_usual_spelling():
     law = PolynomialSystem.from_terms({"x10": {"x10 y_2": 1}, "y_2": {"y_2^2": -3}})
     assert law.terms[-3:] == ("x10^2", "x10 y_2", "y_2^2")
     assert r"\dot{x_{10}} &= x_{10} y_{2} \\" in law.latex()
+    law = PolynomialSystem.from_terms({"of_y_2": {}})
+    assert r"\dot{\mathrm{of\_y}_{2}} &= 0" in law.latex()
 
 
 @pytest.mark.parametrize(

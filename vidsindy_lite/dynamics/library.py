@@ -48,9 +48,16 @@ CLOCK = "t"  #: The time as a variable of a law: after all others, with dt/dt = 
 
 
 def name_latex(name: str) -> str:
-    """A variable as LaTeX: digits at its end become an index."""
-    letters = name.rstrip("0123456789")
-    return name if letters == name else f"{letters.rstrip('_')}_{{{name[len(letters) :]}}}"
+    """A variable as LaTeX: digits at its end become an index; a name of more letters is upright."""
+    letters = re.sub("(?<=.)_*[0-9]+$", "", name)
+    index = name[len(letters) :].strip("_")
+    text = letters if len(letters) == 1 and letters != "_" else upright(letters)
+    return f"{text}_{{{index}}}" if index else text
+
+
+def upright(name: str) -> str:
+    """A name as upright letters of LaTeX."""
+    return r"\mathrm{" + name.replace("_", r"\_") + "}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -756,13 +763,13 @@ def own(
             f"library: {name!r} must return an array of the shape of its arguments, (n,), or "
             f"{measured} of these, got shape {shape} for n = 2 and {longer} for n = 97"
         )
-    latex = rf"\mathrm{{{name}}}"
+    latex = upright(name)
     whole = Function(name, latex, evaluate, axes, timed=axes != named or bool(used), inputs=used)
 
     def component(j: int) -> Function:
         of = names[j]
         return replace(
-            whole, name=f"{name}_{of}", latex=f"{latex}_{{{of}}}", direction=j,
+            whole, name=f"{name}_{of}", latex=f"{latex}_{{{name_latex(of)}}}", direction=j,
             value=partial(evaluate, part=j),
         )  # fmt: skip
 
