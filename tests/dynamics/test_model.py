@@ -48,6 +48,7 @@ def test_terms_are_read_in_any_usual_spelling():
                 ({"x": {"": 1}}, "term: must be '1' or a product"),
                 ({"x": 3}, "equations: must give each variable its terms, .* got {'x': 3}"),
                 ({}, "equations: must give each variable its terms, .* got {}"),
+                ({"x": {"xy": 1}, "y": {}, "xy": {}}, "a name of its own, got 'xy' twice$"),
             ]
         ],
         *[

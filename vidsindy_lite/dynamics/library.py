@@ -699,9 +699,10 @@ def check_library(degree: int | None, library: Library | None) -> Library:
 def check_own_names(terms: Sequence[str]) -> None:
     """Refuse terms of which two have one name."""
     if clash := next((name for name in terms if terms.count(name) > 1), None):
+        made = " (with order 2, x are positions alone, of which the velocities are made)"
         raise ValueError(
-            f"library: a term must have a name of its own, got {clash!r} twice (with order 2, x "
-            "are positions alone, of which the velocities are made)"
+            f"library: a term must have a name of its own, got {clash!r} twice"
+            + made * (clash in velocity_names(terms))
         )
 
 

@@ -325,13 +325,15 @@ class PolynomialSystem:
         if highest > degree:
             raise ValueError(f"degree: must be at least that of the terms, {highest}, got {degree}")
         wanted, _ = (held + Library.polynomial(degree)).resolve(names, measured)
-        named = np.array([powers for powers, _, _ in parsed]).reshape(-1, wanted.shape[1])
+        named = np.array([powers for powers, _, _ in parsed], int).reshape(-1, wanted.shape[1])
         exponents = closure(np.concatenate([wanted, named]))
         coefficients = np.zeros((len(exponents), len(names)))
         rows = places_of(named, exponents).tolist()
         for row, (_, column, value) in zip(rows, parsed, strict=True):
             coefficients[row, column] += value
-        return cls(names, exponents, coefficients, functions=functions)
+        law = cls(names, exponents, coefficients, functions=functions)
+        check_own_names(law.terms)
+        return law
 
     @property
     def d(self) -> int:
