@@ -517,6 +517,9 @@ class Discovery:
     def __str__(self) -> str:
         return "\n".join([self.statement(), *(f"warning: {text}" for text in self.warnings)])
 
+    def __repr__(self) -> str:
+        return f"<Discovery of {', '.join(self.system.names)}: {self.status}>"
+
 
 def _errors(covariance: Floats, law: PolynomialSystem) -> Floats:
     variance = np.maximum(np.diag(covariance), 0.0)
