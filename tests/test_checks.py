@@ -71,12 +71,11 @@ def test_what_is_one_is_given_back():
     assert given[0] == 1  # it is a copy
     np.testing.assert_array_equal(check_rows("x", [[1, 2], [np.nan, 0]], 2), [[1, 2], [np.nan, 0]])
     check_instance("name", "rig.toml", str)
-    assert check_integer("seed", np.int64(3)) == 3
-    assert check_number("angle", np.float32(-0.5)) == -0.5
-    assert check_number("fps", Fraction(30000, 1001)) == 30000 / 1001
-    assert check_positive("scale", 2) == 2.0
-    assert check_image_size([64, 80], least=64) == (64, 80)
-    assert check_image_size((32768, 32768)) == (32768, 32768)
+    numbers = np.float32(-0.5), Fraction(30000, 1001)
+    assert [check_number("angle", one) for one in numbers] == [-0.5, 30000 / 1001]
+    assert (check_integer("seed", np.int64(3)), check_positive("scale", 2)) == (3, 2.0)
+    sizes = check_image_size([64, 80], least=64), check_image_size((32768, 32768))
+    assert sizes == ((64, 80), (32768, 32768))
     assert check_path("path", "a.mkv") == Path("a.mkv")
 
 

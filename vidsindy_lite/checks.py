@@ -132,10 +132,7 @@ def check_array(name: str, values: Any, names: Sequence[str] = ()) -> Floats:
     """
     if names and (own := labels(values)):
         if not {*names} <= {*own}:
-            raise ValueError(
-                f"{name}: must be named like the variables, {', '.join(names)}, got "
-                f"{', '.join(own)}"
-            )
+            raise ValueError(f"{name}: must be named like the variables, {[*names]}, got {own}")
         values = values[list(names)]
     if hasattr(values, "columns") and hasattr(values, "items"):  # each column has its type
         parts = [check_array(f"{name}: {key!r} ({x.dtype})", x) for key, x in values.items()]

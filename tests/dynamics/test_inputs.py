@@ -41,9 +41,7 @@ def test_a_forced_oscillator_is_found_with_its_input_and_foretold(order, noise):
     x = noisy(FORCED[:, : 3 - order], noise)
     found = vl.discover(T, x, library=CUBIC + U, order=order)
     law, v = found.system, "vx" if order == 2 else "y"
-    assert found.status == "ok"
-    assert law.names == ("x", v, "t")
-    assert law.order == order
+    assert (found.status, law.names, law.order) == ("ok", ("x", v, "t"), order)
     assert (terms(law, v), terms(law, "t")) == ({"x", v, "x^3", "u"}, {"1"})
     ahead = found.simulate(FORCED[0], T[:200])
     np.testing.assert_allclose(ahead.x[:, :2], FORCED[:200], atol=1e-4 if noise == 0 else 0.05)

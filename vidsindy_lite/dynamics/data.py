@@ -116,12 +116,10 @@ def check_trajectories(
     for i, run in enumerate(runs):
         if (first := runs.index(run)) < i:
             raise ValueError(f"t: must hold each run once, got trajectory {first} again as {i}")
-    steps = [typical_step([run]) for run in trajectories if len(run[0]) > 1] or [1.0]
-    if max(steps) > MOST_APART * min(steps):
-        raise ValueError(
-            f"t: must have one unit in all trajectories, got median steps from {min(steps):g} to "
-            f"{max(steps):g}"
-        )
+    steps = sorted(typical_step([run]) for run in trajectories if len(run[0]) > 1)
+    if steps and steps[-1] > MOST_APART * steps[0]:
+        low, high = steps[0], steps[-1]
+        raise ValueError(f"t: must have one unit in all runs, got steps of {low:g} and {high:g}")
     return trajectories
 
 

@@ -121,10 +121,7 @@ def _check_variables(law: PolynomialSystem, truth: PolynomialSystem) -> None:
     """Refuse a law of more or fewer variables than the truth, or of the same in another order."""
     here, there = law.names, truth.names
     if len(here) != len(there) or (here != there and {*here} == {*there}):
-        raise ValueError(
-            f"found: must have the variables of truth in their order, {', '.join(there)}, got "
-            f"{', '.join(here)}"
-        )
+        raise ValueError(f"found: must have the variables of truth, {there}, got {here}")
 
 
 def term_errors(found: PolynomialSystem, truth: PolynomialSystem) -> tuple[list[str], list[str]]:
