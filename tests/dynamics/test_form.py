@@ -174,8 +174,7 @@ def without(x, column, noise=0.0):
 def test_a_velocity_that_nobody_saw():
     found = vl.discover(LONG, without(OSCILLATOR.simulate(LONG, [1.5, 0]), 1, 0.02), library=TIED)
     assert study.score(found.system, OSCILLATOR).exact
-    assert found.status == "ok"
-    assert np.isnan(found.noise).tolist() == [False, True]
+    assert (found.status, np.isnan(found.noise).tolist()) == ("ok", [False, True])
 
 
 def test_a_coordinate_between_others_is_told_by_a_sum():

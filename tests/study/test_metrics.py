@@ -44,7 +44,7 @@ def test_pulls_of_the_true_terms_that_were_found():
 
 NOTHING = PolynomialSystem(TRUTH.names, TRUTH.exponents, 0 * TRUTH.coefficients)
 SINE = PolynomialSystem.from_terms({"x": {"sin(x)": -1.0}}, library=Library.fourier())
-TURNED = TRUTH.exponents[:, ::-1], TRUTH.coefficients[:, ::-1]
+TURNED = PolynomialSystem(("y", "x"), TRUTH.exponents[:, ::-1], TRUTH.coefficients[:, ::-1])
 LINE = PolynomialSystem.from_terms({"x": {"x": -1.0}})
 ENZYME = PolynomialSystem.from_terms({"x": {"x x'": -2.0}}, library=Library.rational(1))
 
@@ -69,10 +69,11 @@ def dragged(power):
         (score, LINE, TRUTH, "found: must have the variables of truth, .'x', 'y'., got .'x',"),
         (
             score,
-            PolynomialSystem(("y", "x"), *TURNED),
+            TURNED,
             TRUTH,
-            "of truth, .'x', 'y'., got .'y', 'x'",
+            "found: must have the variables of truth, .'x', 'y'., got .'y', 'x'",
         ),
+        (pulls, SimpleNamespace(system=TURNED), TRUTH, "truth, .'x', 'y'., got .'y', 'x'"),
         (score, TRUTH, NOTHING, "truth: must have at least one term"),
         (score, 1, TRUTH, r"found: must be a PolynomialSystem \(.*\), got 1"),
         (score, TRUTH, SimpleNamespace(system=TRUTH), "truth: must be a Poly.*found comes first"),
