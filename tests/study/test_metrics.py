@@ -67,12 +67,7 @@ def dragged(power):
     ("compare", "one", "other", "message"),
     [
         (score, LINE, TRUTH, "found: must have the variables of truth, .'x', 'y'., got .'x',"),
-        (
-            score,
-            TURNED,
-            TRUTH,
-            "found: must have the variables of truth, .'x', 'y'., got .'y', 'x'",
-        ),
+        (score, TURNED, TRUTH, "found: must have the variables of truth, .'x', 'y'., got .'y'"),
         (pulls, SimpleNamespace(system=TURNED), TRUTH, "truth, .'x', 'y'., got .'y', 'x'"),
         (score, TRUTH, NOTHING, "truth: must have at least one term"),
         (score, 1, TRUTH, r"found: must be a PolynomialSystem \(.*\), got 1"),
