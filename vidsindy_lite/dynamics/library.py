@@ -748,9 +748,8 @@ def own(
     used = {argument: inputs[argument] for argument in arguments if argument in inputs}
     used |= {name: rule} if isinstance(rule, Input) else {}
 
-    columns = [names.index(CLOCK) if a in inputs else names.index(a) for a in arguments]
-    known = [inputs.get(argument) for argument in arguments]
-    evaluate = partial(_evaluated, rule=rule, columns=columns, known=known)
+    of = [(names.index(CLOCK if a in inputs else a), inputs.get(a, np.asarray)) for a in arguments]
+    evaluate = partial(_evaluated, rule=rule, of=of)
 
     try:
         shape, longer = (evaluate(np.ones((n, len(names)))).shape for n in (2, 97))
@@ -777,15 +776,9 @@ def own(
     return [whole] if len(shape) == 1 else [component(j) for j in range(measured)]
 
 
-def _evaluated(
-    x: Floats,
-    rule: Callable[..., ArrayLike],
-    columns: Sequence[int],
-    known: Sequence[Input | None],
-    part: Any = ...,
-) -> Floats:
-    """A function of one's own, or a component, of columns of points and of inputs at such."""
-    values = [x[:, k] if of is None else of(x[:, k]) for k, of in zip(columns, known, strict=True)]
+def _evaluated(x: Floats, rule: Callable[..., Any], of: Sequence[Any], part: Any = ...) -> Floats:
+    """A function of one's own, or a component, of some columns of points, or of inputs there."""
+    values = [argument(x[:, k]) for k, argument in of]
     with np.errstate(all="ignore"):  # what is not finite is refused where it matters
         return np.asarray(rule(*values), dtype=float)[part]
 
