@@ -71,12 +71,11 @@ def test_what_is_one_is_given_back():
     assert given[0] == 1  # it is a copy
     np.testing.assert_array_equal(check_rows("x", [[1, 2], [np.nan, 0]], 2), [[1, 2], [np.nan, 0]])
     check_instance("name", "rig.toml", str)
-    assert check_integer("seed", np.int64(3)) == 3
-    assert check_number("angle", np.float32(-0.5)) == -0.5
-    assert check_number("fps", Fraction(30000, 1001)) == 30000 / 1001
-    assert check_positive("scale", 2) == 2.0
-    assert check_image_size([64, 80], least=64) == (64, 80)
-    assert check_image_size((32768, 32768)) == (32768, 32768)
+    numbers = np.float32(-0.5), Fraction(30000, 1001)
+    assert [check_number("angle", one) for one in numbers] == [-0.5, 30000 / 1001]
+    assert (check_integer("seed", np.int64(3)), check_positive("scale", 2)) == (3, 2.0)
+    sizes = check_image_size([64, 80], least=64), check_image_size((32768, 32768))
+    assert sizes == ((64, 80), (32768, 32768))
     assert check_path("path", "a.mkv") == Path("a.mkv")
 
 
@@ -87,6 +86,8 @@ def test_masked_entries_are_missing(dtype):
     assert type(values) is np.ndarray
     np.testing.assert_array_equal(values, [0, 1, np.nan, 3])
     assert masked.data.tolist() == [0, 1, 2, 3]
+    frame = pd.DataFrame({"a": [None, 1], "b": [0, 2]}, dtype=f"{dtype.__name__.title()}64")
+    np.testing.assert_array_equal(check_array("x", frame), [[np.nan, 0], [1, 2]])
 
 
 def test_messages_name_the_remedy():
@@ -103,6 +104,7 @@ def test_messages_name_the_remedy():
         ((t, x[:, 0]), r"got \(60,\): one coordinate is a column, x\[:, None\]"),
         (([(t, x), (t, x), (t, np.nan * x), (t, x)],), "60 rows of NaN, in trajectory 2"),
         ((t, pd.DataFrame({"time": t, "x": x[:, 0]})), "got the times as column 'time'"),
+        ((t, pd.DataFrame({"x": t, "q": "1"})), r"x: 'q' \(str\): must be an array of real numb"),
         ((t, np.full(x.shape, 10**5000, object)), "x: must be an array of real numbers"),
     ):
         with pytest.raises(ValueError, match=said):

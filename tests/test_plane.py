@@ -218,6 +218,7 @@ def test_what_a_slope_bears_has_no_g(monkeypatch):
     found = vl.discover_from_video("slope.mp4", STICK)
     assert (found.status, found.g) == ("ok", None)
     assert ("pull = " in str(found), " g = " in str(found)) == (True, False)
+    assert max(len(repr(one)) for one in (found, found.discovery)) < 60
     assert "53 degrees off the vertical: something bears it" in found.rig.note
     for start in ((0, 1), (1.2, 4)):  # in whole pixels: straight down, and 10 a frame
         filmed(monkeypatch, pixels_of(flight(start)[1]).round())

@@ -14,7 +14,7 @@ from datetime import date, timedelta
 from fractions import Fraction
 from numbers import Integral, Real
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 from zipfile import BadZipFile
 
 import numpy as np
@@ -118,8 +118,25 @@ def check_positive(name: str, value: float) -> float:
     return float(value)
 
 
-def check_array(name: str, values: ArrayLike) -> Floats:
-    """Real numbers as an array of floats, in which the masked entries of a masked array are NaN."""
+def labels(values: Any) -> list[str]:
+    """The names that values come with, as columns of a frame or entries of a series; else none."""
+    own = getattr(values, "columns", getattr(values, "index", ()))
+    own = [] if callable(own) else list(own)
+    return own if all(isinstance(name, str) and name.isidentifier() for name in own) else []
+
+
+def check_array(name: str, values: Any, names: Sequence[str] = ()) -> Floats:
+    """Real numbers as an array of floats, in which what is masked or not available is NaN.
+
+    Values that come with names are taken in the order of those given.
+    """
+    if names and (own := labels(values)):
+        if not {*names} <= {*own}:
+            raise ValueError(f"{name}: must be named like the variables, {[*names]}, got {own}")
+        values = values[list(names)]
+    if hasattr(values, "columns") and hasattr(values, "items"):  # each column has its type
+        parts = [check_array(f"{name}: {key!r} ({x.dtype})", x) for key, x in values.items()]
+        values = np.column_stack(parts) if parts else values
     advice = ""
     try:
         array = values if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
@@ -131,7 +148,7 @@ def check_array(name: str, values: ArrayLike) -> Floats:
             )
         elif isinstance(first, np.timedelta64 | timedelta):
             advice = ": give seconds, np.array(t, 'timedelta64[us]') / np.timedelta64(1, 's')"
-        if array.dtype.kind not in "iufO":
+        if array.dtype.kind not in "iufO" or isinstance(first, str | bool):
             raise TypeError
         return np.ma.filled(array.astype(float, copy=False), np.nan)
     except MALFORMED:
@@ -140,9 +157,9 @@ def check_array(name: str, values: ArrayLike) -> Floats:
         ) from None
 
 
-def check_vector(name: str, values: ArrayLike, size: int) -> Floats:
+def check_vector(name: str, values: ArrayLike, size: int, names: Sequence[str] = ()) -> Floats:
     """So many finite numbers, shape (size,); a copy."""
-    vector = check_array(name, values).copy()
+    vector = check_array(name, values, names).copy()
     if vector.shape != (size,) or not np.isfinite(vector).all():
         raise ValueError(f"{name}: must be {size} finite numbers, got {shown(values)}")
     return vector

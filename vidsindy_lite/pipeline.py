@@ -75,6 +75,9 @@ class Observation:
         """``"ok"``, or ``"suspect"`` if there is a warning."""
         return "suspect" if self.warnings else "ok"
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {len(self.t)} places: {self.status}>"
+
     @property
     def targets(self) -> int:
         """How many targets there are."""
@@ -593,7 +596,7 @@ def _rig_warnings(
 STILL = 1.5
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class VideoDiscovery(Observation):
     """An observation and the law that it obeys; its warnings are those of both.
 

@@ -67,7 +67,7 @@ class PlaneCamera(OrthographicCamera):
         return carry(np.asarray(np.linalg.inv(self.homography), float), x[:, :2])
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class PlaneDiscovery(VideoDiscovery):
     """A motion in the plane z = 0 of one camera, x rightwards and y upwards, and its law.
 

@@ -191,6 +191,12 @@ def write_file(path: Path, content: bytes) -> None:
     write_files({path: content})
 
 
+def write_json(path: Path, content: object) -> None:
+    """Replace a file by a tree as JSON, with null for NaN, and a number beyond all for infinity."""
+    text = re.sub(r"(?m)NaN(?=,?$)", "null", json.dumps(content, indent=1))  # text ends in a quote
+    write_file(path, re.sub(r"(?m)Infinity(?=,?$)", "1e999", f"{text}\n").encode())
+
+
 def write_files(contents: Mapping[Path, bytes]) -> None:
     """Replace files when all are written beside them; a link is followed, a device written to.
 

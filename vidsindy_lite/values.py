@@ -103,6 +103,8 @@ def built(kind: type, parts: dict[str, Any], known: dict[str, Any]) -> Any:
     strange = next((name for name in parts if name not in hints), None)
     if strange is not None:
         raise ValueError(f"{kind.__name__} must have no {strange!r:.40}")
+    # JSON has no NaN.
+    parts = {k: np.nan if v is None and hints[k] is float else v for k, v in parts.items()}
     for name, value in parts.items():
         if not _is_of(value, hints[name]):
             wanted = getattr(hints[name], "__name__", hints[name])

@@ -121,14 +121,11 @@ def test_a_law_evaluates_differentiates_and_prints():
     v, u = x.T
     wanted = np.column_stack([np.sin(2 * v) - 0.2 * np.hypot(v, u) * v, 2 * np.cos(u)])
     np.testing.assert_allclose(law(x), wanted, rtol=1e-12)
-    step = 1e-6
     for i, axis in enumerate(np.eye(2)):
-        slope = (law(x + step * axis) - law(x - step * axis)) / (2 * step)
+        slope = (law(x + 1e-6 * axis) - law(x - 1e-6 * axis)) / 2e-6
         np.testing.assert_allclose(law.gradient(x)[:, :, i], slope, atol=1e-6)
     assert law.shift([0.0, 0.0])(x) == pytest.approx(law(x))
-    with pytest.raises(
-        ValueError, match="offset: must be zero for a law with functions of the state"
-    ):
+    with pytest.raises(ValueError, match="offset: must be zero for a law with functions of the st"):
         law.shift([1.0, 0.0])
     product = PolynomialSystem.from_terms({"v": {"u cos(u)": 1}, "u": {"1": 1}}, library=library)
     np.testing.assert_allclose(product(x)[:, 0], u * np.cos(u))

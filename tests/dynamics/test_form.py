@@ -147,11 +147,14 @@ def test_columns_name_the_variables():
     found = vl.discover(T, frame("hare", "lynx"), degree=1)
     assert found.system.names == ("hare", "lynx")
     assert found.equations().startswith("dhare/dt = (2.0")
-    other = found.predict(frame("hare", "lynx")[["lynx", "hare"]])
-    np.testing.assert_array_equal(other, found.predict(X))
-    assert vl.discover(T, frame(0, 1), degree=1).system.names == ("x", "y")
-    odd = vl.discover(T, frame("x / m", "y / m"), degree=1)
-    assert odd.system.names == ("x", "y")
+    other, same = frame("hare", "lynx")[["lynx", "hare"]], np.testing.assert_array_equal
+    same(found.predict(other), found.system(X))
+    same(found.system.gradient(other.iloc[0]), found.system.gradient(X[0]))
+    same(found.simulate(other.iloc[0], T[:2]).x[0], X[0])
+    with pytest.raises(ValueError, match="x: .* variables, .'hare', 'lynx'., got .'lynx', 'x'."):
+        found.predict(other.rename(columns={"hare": "x"}))
+    for names in ((0, 1), ("x / m", "y / m")):
+        assert vl.discover(T, frame(*names), degree=1).system.names == ("x", "y")
 
 
 # ------------------------------------------------------------------------------ what was never seen
@@ -171,8 +174,7 @@ def without(x, column, noise=0.0):
 def test_a_velocity_that_nobody_saw():
     found = vl.discover(LONG, without(OSCILLATOR.simulate(LONG, [1.5, 0]), 1, 0.02), library=TIED)
     assert study.score(found.system, OSCILLATOR).exact
-    assert found.status == "ok"
-    assert np.isnan(found.noise).tolist() == [False, True]
+    assert (found.status, np.isnan(found.noise).tolist()) == ("ok", [False, True])
 
 
 def test_a_coordinate_between_others_is_told_by_a_sum():
@@ -249,7 +251,7 @@ def test_an_error_of_scale_changes_error_bars_alone():
     assert told.standard_errors[product] == pytest.approx(expected, rel=0.3)
 
 
-RUNS, CURVE = [(T, X), (T, X)], np.ones((2, 200, 2))
+RUNS, CURVE = [(T, X), (T, -X)], np.ones((2, 200, 2))
 
 
 @pytest.mark.parametrize(
@@ -266,7 +268,10 @@ RUNS, CURVE = [(T, X), (T, X)], np.ones((2, 200, 2))
         ({"t": RUNS, "x": None, "sigma": [0.1] * 3}, "sigma: must be one per .*, got 3 for 2"),
         ({"origin": "here"}, "origin: must be one of learn, data, got 'here'"),
         ({"t": [(T, X), (T, X * [1, np.nan])], "x": None}, "in all trajectories or in none, got c"),
-        ({"t": [(T, frame("a", "b")), (T, frame("b", "a"))], "x": None}, "must be named alike in"),
+        ({"t": [(T, frame("a", "b")), (2 * T, frame("b", "a"))], "x": None}, "must be named alike"),
+        ({"sigma": frame("y", "b")}, "sigma: must be named like the variables, .'x', 'y'., got"),
+        ({"t": [*RUNS, (T, X)], "x": None}, "must hold each run once, got trajectory 0 again as 2"),
+        ({"t": [(T, X), (999 * T, X)], "x": None}, "one unit in all .*, got steps of 0.1"),
         ({"x": frame("a", "a")}, "x: columns must have names of their own, got .'a', 'a'."),
     ],
 )

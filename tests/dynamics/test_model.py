@@ -33,6 +33,8 @@ def test_terms_are_read_in_any_usual_spelling():
     law = PolynomialSystem.from_terms({"x10": {"x10 y_2": 1}, "y_2": {"y_2^2": -3}})
     assert law.terms[-3:] == ("x10^2", "x10 y_2", "y_2^2")
     assert r"\dot{x_{10}} &= x_{10} y_{2} \\" in law.latex()
+    law = PolynomialSystem.from_terms({"of_y_2": {}})
+    assert r"\dot{\mathrm{of\_y}_{2}} &= 0" in law.latex()
 
 
 @pytest.mark.parametrize(
@@ -46,6 +48,7 @@ def test_terms_are_read_in_any_usual_spelling():
                 ({"x": {"": 1}}, "term: must be '1' or a product"),
                 ({"x": 3}, "equations: must give each variable its terms, .* got {'x': 3}"),
                 ({}, "equations: must give each variable its terms, .* got {}"),
+                ({"x": {"xy": 1}, "y": {}, "xy": {}}, "a name of its own, got 'xy' twice$"),
             ]
         ],
         *[
@@ -68,14 +71,8 @@ def test_terms_are_read_in_any_usual_spelling():
         (lambda: LINE.simulate([0, np.inf], [1]), "t: must be finite, got inf"),
         (lambda: LINE.simulate([0, 1], [1, 2]), "x0: must be 1 finite numbers"),
         (lambda: LINE.library(np.zeros((4, 2))), r"x: must have shape \(n, 1\), got \(4, 2\)"),
-        *[
-            (lambda use=use: use("abc"), "x: must be an array of real numbers, got 'abc'")
-            for use in (LINE, LINE.gradient, LINE.library)
-        ],
-        *[
-            (lambda offset=offset: LINE.shift(offset), "offset: must be")
-            for offset in ([1, 2], "abc", None)
-        ],
+        *[(lambda f=f: f("a"), "x: must .*, got 'a'") for f in (LINE, LINE.gradient, LINE.library)],
+        *[(lambda at=at: LINE.shift(at), "offset: must be") for at in ([1, 2], "abc", None)],
     ],
 )
 def test_bad_systems_and_uses_are_refused(make, message):
@@ -134,11 +131,9 @@ def test_what_ends_a_path_is_told_and_after_it_there_is_nothing():
     t = np.linspace(0, 2, 21)  # 1 / (1 - t)
     path, end = integrate(lambda x: x**2, t, np.array([1.0]), farthest=1e6)
     np.testing.assert_allclose(path[:10, 0], 1 / (1 - t[:10]), rtol=1e-9)
-    assert np.isnan(path[10:]).all()
-    assert end == "diverges"
+    assert (np.isnan(path[10:]).all(), end) == (True, "diverges")
     endless, end = integrate(lambda x: x**2, t, np.array([1.0]))
-    assert np.isnan(endless[11:]).all()
-    assert end == "diverges"
+    assert (np.isnan(endless[11:]).all(), end) == (True, "diverges")
     path, end = integrate(lambda x: -1e6 * (x - 1), 10 * t, np.zeros(1), most_steps=200)
     assert np.isfinite(path[0]).all()
     assert np.isnan(path[-1]).all()
@@ -184,7 +179,7 @@ def with_value(row, value):
         (
             T,
             with_value(3, -1e150),
-            r"x: must be between 1e-100 and 1e\+100, got 1e\+150 at most: take another unit",
+            r"x: must be between .* 1e.100, got 1e.150 at most: take another",
         ),
         (T, np.diag(np.full(5, np.nan)) + 1, "x: must hold at least one row without NaN, got 5"),
         (T, np.full((5, 2), np.nan), "x: must hold a number, got 5 rows of NaN"),

@@ -9,13 +9,14 @@ from typing import cast
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..checks import FARTHEST, check_array, check_items, check_times, shown
+from ..checks import FARTHEST, check_array, check_items, check_times, labels, shown
 
 # --------------------------------------------------------------------------------------------------
 # Measured trajectories: checked input, and its cut into stretches without gaps.
 
 #: Lag-1 autocorrelation, in standard errors of white noise, from which on errors are dependent.
 CHANCE = 4.0
+MOST_APART = 100.0  #: Median steps of runs over each other: beyond, one is in other units.
 #: Times (n,) and states (n, d), NaN where a coordinate was not seen; in each row one was.
 Trajectory = tuple[Floats, Floats]
 
@@ -84,7 +85,7 @@ def check_trajectories(
     ------
     ValueError
         If ``t`` is neither, or a trajectory is malformed: see `check_trajectory`; of these a row
-        is left out only if nothing was seen in it.
+        is left out only if nothing was seen in it. If one is there twice, or in other units.
     """
     pairs = t if x is None else [(t, x)]
     items = pairs if isinstance(pairs, list | tuple) else [pairs]
@@ -111,6 +112,14 @@ def check_trajectories(
             f"x: a coordinate must be seen in all trajectories or in none, got column {column} "
             f"without a number in trajectory {int(seen[:, column].argmin())}"
         )
+    runs = [(times.tobytes(), values.tobytes()) for times, values in trajectories]
+    for i, run in enumerate(runs):
+        if (first := runs.index(run)) < i:
+            raise ValueError(f"t: must hold each run once, got trajectory {first} again as {i}")
+    steps = sorted(typical_step([run]) for run in trajectories if len(run[0]) > 1)
+    if steps and steps[-1] > MOST_APART * steps[0]:
+        low, high = steps[0], steps[-1]
+        raise ValueError(f"t: must have one unit in all runs, got steps of {low:g} and {high:g}")
     return trajectories
 
 
@@ -137,15 +146,14 @@ def coordinate_names(pairs: Sequence[tuple[Floats, Floats]]) -> tuple[str, ...]:
             clock = str(name).lower() in ("t", "time", "times", "seconds", "timestamp")
             if clock and np.array_equal(frame[name], times):
                 raise ValueError(f"x: must hold states alone, got the times as column {name!r}")
-    if columns[0] and all(isinstance(name, str) and name.isidentifier() for name in columns[0]):
-        return tuple(columns[0])
-    return variable_names(np.shape(pairs[0][1])[1])
+    return tuple(labels(pairs[0][1])) or variable_names(np.shape(pairs[0][1])[1])
 
 
 def check_sigma(
     sigma: float | Floats | Sequence[float | Floats] | None,
     times: Sequence[Floats],
     trajectories: Sequence[Trajectory],
+    names: Sequence[str],
 ) -> list[Floats] | None:
     """Standard errors of samples as `discover` takes them, at those that are not missing.
 
@@ -156,6 +164,7 @@ def check_sigma(
     times : sequence of array_like, shape (n,)
         Of all samples of each trajectory, missing or not.
     trajectories : sequence of Trajectory
+    names : sequence of str, length d
 
     Returns
     -------
@@ -174,7 +183,7 @@ def check_sigma(
     check_items("sigma", given, len(trajectories), "trajectory")
     checked = []
     for part, t, (seen, x) in zip(given, times, trajectories, strict=True):
-        errors, shape = check_array("sigma", part), (len(t), x.shape[1])
+        errors, shape = check_array("sigma", part, names), (len(t), x.shape[1])
         if errors.shape not in ((), shape[1:], shape):
             raise ValueError(
                 f"sigma: must be a number, or have shape {shape[1:]} or {shape}, got {errors.shape}"

@@ -8,9 +8,10 @@ import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import combinations_with_replacement
 from math import comb
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,9 +48,16 @@ CLOCK = "t"  #: The time as a variable of a law: after all others, with dt/dt = 
 
 
 def name_latex(name: str) -> str:
-    """A variable as LaTeX: digits at its end become an index."""
-    letters = name.rstrip("0123456789")
-    return name if letters == name else f"{letters.rstrip('_')}_{{{name[len(letters) :]}}}"
+    """A variable as LaTeX: digits at its end become an index; a name of more letters is upright."""
+    letters = re.sub("(?<=.)_*[0-9]+$", "", name)
+    index = name[len(letters) :].strip("_")
+    text = letters if len(letters) == 1 and letters != "_" else upright(letters)
+    return f"{text}_{{{index}}}" if index else text
+
+
+def upright(name: str) -> str:
+    """A name as upright letters of LaTeX."""
+    return r"\mathrm{" + name.replace("_", r"\_") + "}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +92,7 @@ class Function:
     @classmethod
     def unknown(cls, name: str) -> Function:
         """A function of which nothing but the name is known: NaN everywhere."""
-        return cls(name, name, lambda x: np.full(len(x), np.nan), (0,))
+        return cls(name, name, _unknown, (0,))
 
     @property
     def of_time(self) -> bool:
@@ -105,6 +113,10 @@ class Function:
             far = self.value(x + 2 * step) - self.value(x - 2 * step)
             result[:, axis] = (8 * near - far) / (12 * step[axis])
         return result
+
+
+def _unknown(x: Floats) -> Floats:
+    return np.full(len(x), np.nan)
 
 
 def extended(x: Floats, functions: Sequence[Function]) -> Floats:
@@ -687,9 +699,10 @@ def check_library(degree: int | None, library: Library | None) -> Library:
 def check_own_names(terms: Sequence[str]) -> None:
     """Refuse terms of which two have one name."""
     if clash := next((name for name in terms if terms.count(name) > 1), None):
+        made = " (with order 2, x are positions alone, of which the velocities are made)"
         raise ValueError(
-            f"library: a term must have a name of its own, got {clash!r} twice (with order 2, x "
-            "are positions alone, of which the velocities are made)"
+            f"library: a term must have a name of its own, got {clash!r} twice"
+            + made * (clash in velocity_names(terms))
         )
 
 
@@ -704,8 +717,12 @@ def harmonic(names: tuple[str, ...], axis: int, multiple: int, kind: str) -> Fun
     """Sine or cosine of a multiple of a coordinate."""
     times, of = "" if multiple == 1 else f"{multiple} ", {"sin": np.sin, "cos": np.cos}[kind]
     latex = rf"\{kind}({times}{name_latex(names[axis])})"
-    value = lambda x: of(multiple * x[:, axis])  # noqa: E731
+    value = partial(_harmonic, of=of, multiple=multiple, axis=axis)
     return Function(f"{kind}({times}{names[axis]})", latex, value, (axis,))
+
+
+def _harmonic(x: Floats, of: np.ufunc, multiple: int, axis: int) -> Floats:
+    return np.asarray(of(multiple * x[:, axis]))
 
 
 def own(
@@ -731,11 +748,8 @@ def own(
     used = {argument: inputs[argument] for argument in arguments if argument in inputs}
     used |= {name: rule} if isinstance(rule, Input) else {}
 
-    def evaluate(x: Floats) -> Floats:
-        values = dict(zip(names, x.T, strict=True))
-        values |= {known: of_time(values[CLOCK]) for known, of_time in inputs.items()}
-        with np.errstate(all="ignore"):  # what is not finite is refused where it matters
-            return np.asarray(rule(*(values[argument] for argument in arguments)), dtype=float)
+    of = [(names.index(CLOCK if a in inputs else a), inputs.get(a, np.asarray)) for a in arguments]
+    evaluate = partial(_evaluated, rule=rule, of=of)
 
     try:
         shape, longer = (evaluate(np.ones((n, len(names)))).shape for n in (2, 97))
@@ -749,17 +763,24 @@ def own(
             f"library: {name!r} must return an array of the shape of its arguments, (n,), or "
             f"{measured} of these, got shape {shape} for n = 2 and {longer} for n = 97"
         )
-    latex = rf"\mathrm{{{name}}}"
+    latex = upright(name)
     whole = Function(name, latex, evaluate, axes, timed=axes != named or bool(used), inputs=used)
 
     def component(j: int) -> Function:
         of = names[j]
         return replace(
-            whole, name=f"{name}_{of}", latex=f"{latex}_{{{of}}}", direction=j,
-            value=lambda x: evaluate(x)[j],
+            whole, name=f"{name}_{of}", latex=f"{latex}_{{{name_latex(of)}}}", direction=j,
+            value=partial(evaluate, part=j),
         )  # fmt: skip
 
     return [whole] if len(shape) == 1 else [component(j) for j in range(measured)]
+
+
+def _evaluated(x: Floats, rule: Callable[..., Any], of: Sequence[Any], part: Any = ...) -> Floats:
+    """A function of one's own, or a component, of some columns of points, or of inputs there."""
+    values = [argument(x[:, k]) for k, argument in of]
+    with np.errstate(all="ignore"):  # what is not finite is refused where it matters
+        return np.asarray(rule(*values), dtype=float)[part]
 
 
 def _arguments(rule: Callable[..., ArrayLike]) -> list[str]:

@@ -134,7 +134,7 @@ def physics_of(
         If ``down`` is no direction.
     """
     if down is not None:
-        down = check_vector("down", down, law.d // law.order)
+        down = check_vector("down", down, law.d // law.order, law.names[: law.d // law.order])
         if not down.any():
             raise ValueError("down: must be a direction, got zeros only")
         down = down / np.linalg.norm(down)

@@ -77,7 +77,7 @@ def runge_kutta_4(
     -------
     ndarray, shape (n, d) or (n, m, d)
     """
-    states = [check_array("x0", x0)]
+    states = [check_array("x0", x0, getattr(rate, "names", ()))]
     d = getattr(rate, "d", None)
     if d is not None and states[0].shape[-1:] != (d,):
         raise ValueError(f"x0: must have shape ({d},) or (m, {d}), got {states[0].shape}")
@@ -325,13 +325,15 @@ class PolynomialSystem:
         if highest > degree:
             raise ValueError(f"degree: must be at least that of the terms, {highest}, got {degree}")
         wanted, _ = (held + Library.polynomial(degree)).resolve(names, measured)
-        named = np.array([powers for powers, _, _ in parsed]).reshape(-1, wanted.shape[1])
+        named = np.array([powers for powers, _, _ in parsed], int).reshape(-1, wanted.shape[1])
         exponents = closure(np.concatenate([wanted, named]))
         coefficients = np.zeros((len(exponents), len(names)))
         rows = places_of(named, exponents).tolist()
         for row, (_, column, value) in zip(rows, parsed, strict=True):
             coefficients[row, column] += value
-        return cls(names, exponents, coefficients, functions=functions)
+        law = cls(names, exponents, coefficients, functions=functions)
+        check_own_names(law.terms)
+        return law
 
     @property
     def d(self) -> int:
@@ -420,7 +422,7 @@ class PolynomialSystem:
 
     def __call__(self, x: Floats) -> Floats:
         """Time derivative at ``x``, shape (n, d) or (d,), in state units per time unit."""
-        x = check_array("x", x)
+        x = check_array("x", x, self.names)
         return (self._own.library(np.atleast_2d(x)) @ self._own.coefficients).reshape(x.shape)
 
     def gradient(self, x: Floats) -> Floats:
@@ -436,7 +438,7 @@ class PolynomialSystem:
         ndarray, shape (n, d, d) or (d, d)
             ``[..., j, i]`` is the derivative of equation j with respect to variable i.
         """
-        x = check_array("x", x)
+        x = check_array("x", x, self.names)
         points, (exponents, law) = self._points(np.atleast_2d(x)), self._own._closed
         _, _, jacobian = linearised(points, self.functions, exponents, law)
         return jacobian.reshape(*x.shape, self.d)
@@ -457,7 +459,7 @@ class PolynomialSystem:
             If the shift is not zero, and the law holds functions of the state, or the denominator
             of a fraction vanishes at the new origin.
         """
-        shift = check_vector("offset", offset, self.d)
+        shift = check_vector("offset", offset, self.d, self.names)
         moves = all(function.of_time for function in self.functions)
         if shift[self.states :].any() or (shift.any() and not moves):
             raise ValueError(
@@ -506,8 +508,8 @@ class PolynomialSystem:
         """The path that `simulate` finds, and what happens at its end; empty if it has all rows."""
         t = check_times(t)
         if self.timed and np.shape(x0) != (self.d,):
-            x0 = np.append(check_vector("x0", x0, self.states), t[0])
-        x0, clock = check_vector("x0", x0, self.d), np.zeros(self.d)
+            x0 = np.append(check_vector("x0", x0, self.states, self.names[:-1]), t[0])
+        x0, clock = check_vector("x0", x0, self.d, self.names), np.zeros(self.d)
         driven, since = self.driven(), t - t[0]
         if self.timed:
             if abs(x0[-1] - t[0]) > 1e-6 * (since[-1] or 1.0):
@@ -607,7 +609,7 @@ class PolynomialSystem:
         return f"${self.latex()}$"
 
     def _points(self, x: Floats) -> Floats:
-        x = check_array("x", x)
+        x = check_array("x", x, self.names)
         if x.ndim != 2 or x.shape[1] != self.d:
             raise ValueError(f"x: must have shape (n, {self.d}), got {x.shape}")
         return x

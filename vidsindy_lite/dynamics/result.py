@@ -3,7 +3,6 @@ file, and its path of laws as a picture."""
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import time
@@ -19,7 +18,7 @@ from tqdm import tqdm
 
 from ..arrays import Bools, Floats
 from ..checks import MALFORMED, check_array, check_choice, check_instance, check_output, shown
-from ..storage import check_file, read_tree, write_file
+from ..storage import check_file, read_tree, write_json
 from ..values import built, decoded, encoded
 from .bspline import smooth
 from .collocation import Fit, WithCurve
@@ -346,16 +345,14 @@ class Discovery:
     def predict(self, x: Floats) -> Floats:
         """Time derivative at states, shape (n, d) or (d,), in units of the data.
 
-        The columns of a data frame may have any order, if they are named like the variables.
+        What is named like the variables, as columns of a data frame are, may have any order.
 
         Raises
         ------
         ValueError
-            If the states have another shape, or an input of the law is not known at their times.
+            If states have another shape or names, or an input is not known at their times.
         """
-        names = self.system.names
-        if set(names) <= set(getattr(x, "columns", ())):
-            x = cast("Any", x)[list(names)]
+        x = check_array("x", x, self.system.names)
         slopes = self.system(x)
         self.system.check_inputs(np.atleast_2d(x)[:, -1])
         return slopes
@@ -450,7 +447,7 @@ class Discovery:
             "functions": encoded(_values(self), str),
             "discovery": encoded(self, attrgetter("__name__"), (Function,)),
         }
-        write_file(file, f"{json.dumps(content, indent=1)}\n".encode())
+        write_json(file, content)
 
     @staticmethod
     def load(path: str | os.PathLike, library: Library | None = None) -> Discovery:
@@ -519,6 +516,9 @@ class Discovery:
 
     def __str__(self) -> str:
         return "\n".join([self.statement(), *(f"warning: {text}" for text in self.warnings)])
+
+    def __repr__(self) -> str:
+        return f"<Discovery of {', '.join(self.system.names)}: {self.status}>"
 
 
 def _errors(covariance: Floats, law: PolynomialSystem) -> Floats:

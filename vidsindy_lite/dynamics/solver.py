@@ -150,7 +150,7 @@ def discover(
     pairs = cast("Sequence[tuple[Floats, Floats]]", t if x is None else [(t, x)])
     names, times = coordinate_names(pairs), [np.asarray(times) for times, _ in pairs]
     shared = check_systematic(systematic, times, trajectories)
-    measured = trajectories, shared, check_sigma(sigma, times, trajectories)
+    measured = trajectories, shared, check_sigma(sigma, times, trajectories, names)
     limit = np.inf if time_limit is None else check_positive("time_limit", time_limit)
     end = time.perf_counter() + limit
     task = _Task(measured, names, library, origin, seed, progress, end)

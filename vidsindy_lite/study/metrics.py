@@ -71,7 +71,7 @@ def score(found: PolynomialSystem | Discovery, truth: PolynomialSystem) -> Score
         The discovered law; anything else that has one as its ``system`` will do as well.
     truth : PolynomialSystem
         The true law. Libraries may differ in degree and order, not in their functions: terms are
-        matched by monomial, variables by position.
+        matched by monomial, variables by position: of the same names in another order are none.
 
     Raises
     ------
@@ -91,8 +91,7 @@ def score(found: PolynomialSystem | Discovery, truth: PolynomialSystem) -> Score
                 f"{name}: must be a PolynomialSystem (what was found comes first, the truth "
                 f"second), got {shown(one)}"
             )
-    if law.d != truth.d:
-        raise ValueError(f"found: must have the dimension of truth, {truth.d}, got {law.d}")
+    _check_variables(law, truth)
     points = np.random.default_rng(0).normal(size=(9, law.d))
     functions = [
         [(f.name, np.nan_to_num(f.value(points)).round(9).tolist()) for f in one.functions]
@@ -116,6 +115,13 @@ def score(found: PolynomialSystem | Discovery, truth: PolynomialSystem) -> Score
         recall=hits / actual,
         coefficient_errors=np.abs(coefficients_in(law, truth.exponents) / wanted - 1),
     )
+
+
+def _check_variables(law: PolynomialSystem, truth: PolynomialSystem) -> None:
+    """Refuse a law of more or fewer variables than the truth, or of the same in another order."""
+    here, there = law.names, truth.names
+    if len(here) != len(there) or (here != there and {*here} == {*there}):
+        raise ValueError(f"found: must have the variables of truth, {there}, got {here}")
 
 
 def term_errors(found: PolynomialSystem, truth: PolynomialSystem) -> tuple[list[str], list[str]]:
@@ -147,6 +153,7 @@ def pulls(found: Discovery, truth: PolynomialSystem) -> Floats:
         ``(found - true) / standard error``. If the standard errors are right, and the law is, its
         mean square is 1; the coefficients of one law are correlated.
     """
+    _check_variables(found.system, truth)
     uncertain = replace(found.system, coefficients=found.standard_errors)
     errors, values = (coefficients_in(law, truth.exponents) for law in (uncertain, found.system))
     seen = truth.support & (errors > 0)
@@ -250,7 +257,7 @@ def cramer_rao_bound(
     -------
     Bound
     """
-    d, sigma = system.d, check_vector("sigma", sigma, system.d)
+    d, sigma = system.d, check_vector("sigma", sigma, system.d, system.names)
     if (sigma <= 0).any():
         raise ValueError(f"sigma: must be positive, got {shown(sigma)}")
     moving = np.zeros(d, dtype=bool) if moving is None else np.asarray(moving, dtype=bool)

@@ -8,7 +8,6 @@ augmentations from the seed and its own number.
 """
 
 import io
-import json
 import os
 from typing import Any
 
@@ -22,7 +21,7 @@ from tqdm import trange
 
 from ..arrays import Floats, Floats32, Image
 from ..checks import check_integer, check_path
-from ..storage import library_versions, write_file
+from ..storage import library_versions, write_file, write_json
 from .rendering import BACKGROUNDS, COLOURS, Box, LabelledFrame, Scene, draw_frames
 from .tracking import WEIGHTS
 
@@ -329,7 +328,7 @@ def train(
     torch.save(network.state_dict(), memory)
     write_file(weights, memory.getvalue())
     log = _training_log(seed, losses, sum(p.numel() for p in network.parameters()))
-    write_file(weights.with_suffix(".json"), (json.dumps(log, indent=1) + "\n").encode())
+    write_json(weights.with_suffix(".json"), log)
     return log
 
 
