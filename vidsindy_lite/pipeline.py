@@ -10,6 +10,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any, cast
 
@@ -36,6 +37,8 @@ from .checks import (
 from .dynamics import Discovery, Library, Quantity, Round, Swing
 from .progress import bar
 from .vision import Hint, TrackFile
+
+_BEYOND = 0.1  # share of an image by which a tenth of the places may lie beyond it
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,6 +248,16 @@ def observe_tracks(
                 f"tracks: must be in pixels, got {name} with all places between -1 and 1: if they "
                 f"are shares of the image multiply them by its size, {camera.image_size}"
             )
+        seen, size = track[np.isfinite(track).all(axis=1)], np.array(camera.image_size)
+        beyond = np.maximum(-seen, seen - size)
+        # Some places of a tracker may be wild, and some beyond the border by part of the target.
+        if np.mean((beyond > _BEYOND * size).any(axis=1)) > _BEYOND:
+            i = beyond.max(axis=1).argmax()
+            raise ValueError(
+                f"tracks: must lie in the image of their camera, image_size = {camera.image_size}, "
+                f"got {name} with places such as ({seen[i, 0]:.5g}, {seen[i, 1]:.5g}): give the "
+                "image_size of the video to the rig, or check which track is whose"
+            )
     cleared = [without_wild(*each) for each in zip(raw, names, strict=True)]
     raw, said = [track for track, _ in cleared], [wild for _, wild in cleared]
     if isinstance(lags, str):
@@ -267,6 +280,11 @@ def _observed(
     synchronous: bool = False,
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
+    for (i, one), (j, other) in combinations(enumerate(raw), 2):
+        if np.array_equal(one, other, equal_nan=True):
+            pair = f"{names[i]} and {names[j]} with the same places"
+            message = f"tracks: must be of another film for each camera, got {pair}"
+            raise Refused(message, "track", raw)
     films = Footage.of(raw, lags, clock.rates, clock.frames)
     rig, affine = cameras.paced(rig, clock.rates), None
     if not rig.is_measured:
