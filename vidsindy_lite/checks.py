@@ -131,7 +131,9 @@ def check_array(name: str, values: ArrayLike) -> Floats:
             )
         elif isinstance(first, np.timedelta64 | timedelta):
             advice = ": give seconds, np.array(t, 'timedelta64[us]') / np.timedelta64(1, 's')"
-        if array.dtype.kind not in "iufO":
+        # Beside numbers a boolean becomes one.
+        listed = () if isinstance(values, np.ndarray) else np.asarray(values, object).flat
+        if array.dtype.kind not in "iufO" or any(isinstance(value, bool) for value in listed):
             raise TypeError
         return np.ma.filled(array.astype(float, copy=False), np.nan)
     except MALFORMED:
