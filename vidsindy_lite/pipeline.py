@@ -278,8 +278,12 @@ def _observed(
     doubts: Sequence[str] = (),
     progress: bool | None = None,
     synchronous: bool = False,
+    before: Floats | int = 0,
 ) -> Observation:
-    """What the tracks of videos of these names tell, with the tracker's doubts about them."""
+    """What the tracks of videos of these names tell, with the tracker's doubts about them.
+
+    The lags count from those before, which the tracks are aligned by.
+    """
     for (i, one), (j, other) in combinations(enumerate(raw), 2):
         if np.array_equal(one, other, equal_nan=True):
             pair = f"{names[i]} and {names[j]} with the same places"
@@ -314,9 +318,10 @@ def _observed(
         with refusing("lags", raw, names):
             best = cameras.learn_lags(raw, rig, clock.rates, lags, clock.frames, progress=progress)
             if lags is not None and _apart(lags, best, 0.5):  # frames
+                given, right = (cameras.list_lags(each + before) for each in (lags, best.frames))
                 raise ValueError(
-                    f"lags: must make the views agree, got ({cameras.list_lags(lags)}) frames "
-                    f"where ({cameras.list_lags(best.frames)}) do: leave them out, or check them"
+                    f"lags: must make the views agree, got ({given}) frames, none counting as 0, "
+                    f"where ({right}) do: give those, or check the films"
                 )
     told = best if lags is None else replace(best, frames=lags, errors=0 * lags, warnings=())
     tracks = replace(films, lags=told.frames, rates=best.rates).aligned
@@ -385,7 +390,7 @@ def _several_observed(
     t, step = clock.times, np.diff(clock.times).min()
     later = (t[-1] - t[0] + 2 * step) * np.arange(count)[:, None]
     long = Clock.of_tracks((np.append(t, t[-1] + step) + later).ravel()[:-1], rows)
-    seen = _observed(rows, rig, long, 0 * begun, names, (*doubts, *unsure), progress)
+    seen = _observed(rows, rig, long, 0 * begun, names, (*doubts, *unsure), progress, before=begun)
     modes = [cameras.side_by_side(mode, count) for mode in seen.systematic]
     x = cameras.side_by_side(seen.x, count)
     lost = np.flatnonzero(np.isnan(x).any(axis=1))
@@ -577,7 +582,7 @@ def _rig_warnings(
         if worst <= cameras.DISAGREEMENT:
             return [
                 "the lags that are given differ from those of the tracks: "
-                f"({cameras.list_lags(lags)}) for {told} frames: leave them out, or check"
+                f"({cameras.list_lags(lags)}) for {told} frames: give those, or check"
             ]
         advice, where = f"the lags {told} would explain it best", " at the lags that are given"
     elif (why := cameras.explain(tracks, given, learned)) is not None and (
