@@ -23,6 +23,7 @@ from .models import Camera, at_once, independent, intersect, missed
 from .rig import ALIKE, Rig
 
 _SHORTEST = 4  # frames of a run, and of what two runs have in common
+_ENOUGH = 60  # frames from which the cameras are learned
 _AHEAD, _DEGREE = 6, 4  # frames on both sides of a gap, through which a target goes like t^4
 
 
@@ -150,6 +151,7 @@ def _cameras(views: Sequence[Floats], runs: Sequence[_Run], rig: Rig) -> tuple[C
             f"{_SHORTEST} frames, got no such frames"
         )
     common = np.flatnonzero((which == sets[counts.argmax()]).all(axis=1))
+    common = common[:: -(-len(common) // _ENOUGH)]
     places = [view[common] for view in views]
     orders = list(permutations(range(views[0].shape[1])))
     ways: list[tuple[tuple[int, ...], ...]] = [(orders[0],)]
