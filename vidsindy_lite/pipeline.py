@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
@@ -589,6 +589,8 @@ def _rig_warnings(
         few or why.left <= max(cameras.GROSS / 2, worst / 3)
     ):
         advice = f"{why.text(names)} would explain it best"
+    elif not few and (alone := _contradicted(tracks, given)) is not None:
+        advice = f"without {names[alone]} the others agree: check what it shows, or leave it out"
     elif not few and cameras.smooth(tracks, learned):
         advice = (
             "no single cause explains it; check the positions and normals, the scales and angles "
@@ -604,6 +606,18 @@ def _rig_warnings(
         f"the rig does not agree with the tracks{where}: in one frame of ten, tracked and "
         f"reconstructed target lie more than {sizes} pixels apart: {advice}"
     ]
+
+
+def _contradicted(tracks: Sequence[Floats], given: Rig) -> int | None:
+    """The one of four or more tracks without which the others agree, if there is one."""
+    left = {}
+    for i in range(len(tracks)) if len(tracks) > 3 else ():
+        others = [j for j in range(len(tracks)) if j != i]
+        with suppress(ValueError):
+            rest, rig = [tracks[j] for j in others], Rig(tuple(given.cameras[j] for j in others))
+            left[i] = max(cameras.disagreement(rest, cameras.learn_cameras(rest, rig)))
+    best = min(left, key=lambda i: left[i], default=-1)
+    return best if left.get(best, np.inf) <= cameras.GROSS / 2 else None
 
 
 # ---------------------------------------------------------------------------------------- the law
