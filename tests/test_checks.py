@@ -38,7 +38,7 @@ def refused(check, values, message):
         *refused(check_integer, [-1, 1.5, 2.0, True, "2", None, np.nan, [1]], INTEGER),
         *refused(check_number, [np.nan, -np.inf, True, "1", 10**999, None, np.ones(1)], NUMBER),
         *refused(check_positive, [0, -1e-9], "n: must be positive, got "),
-        *refused(check_array, ["abc", ["1", "2"], [1j], [[1], [1, 2]], object()], ARRAY),
+        *refused(check_array, ["abc", ["1", "2"], [1j], [[1], [1, 2]], object(), [True, 2]], ARRAY),
         *refused(check_array, [np.arange(3).astype("datetime64[s]")], ARRAY),
         *refused(lambda n, x: check_vector(n, x, 2), [[1, 2, 3], [1, np.nan], [[1, 2]]], VECTOR),
         *refused(lambda _, t: check_times(t), [[], 3.0], "t: must hold at least one time"),

@@ -1,6 +1,7 @@
 """What tracks tell of a path with lags that are given, and what is wrong where they tell none."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -38,7 +39,7 @@ def test_a_view_along_the_motion_helps_though_its_lag_is_not_told():
     t = np.arange(120) / 30
     x = np.outer(3 + 2 * np.cos(4 * t), (0, 0, 1))
     cameras = [
-        vl.OrthographicCamera(position=10 * normal, normal=normal, scale=0.01, angle=0.0)
+        vl.OrthographicCamera(position=10 * normal, normal=normal, scale=0.02, angle=0.0)
         for normal in np.eye(3)
     ]
     rng, rig = np.random.default_rng(0), vl.Rig(tuple(cameras))
@@ -264,12 +265,17 @@ def test_an_interruption_holds_the_tracks_and_is_no_error_to_be_caught():
         ({"t": range(150), "fps": 9}, "fps: must not be given with t, got 9"),
         ({"fps": 9, "individual": "a"}, "individual: must be given with files of tracks alone"),
         ({"fps": 9, "lags": "synchronous", "still": True}, "tracks: must show a target that moves"),
+        ({"fps": 9, "twice": True}, r"another film for each camera, got tracks.0. and tracks.2. w"),
+        ({"fps": 9, "size": (150, 512)}, r"image_size = \(150, 512\), got tracks.1. with places"),
     ],
 )
 def test_tracks_need_times_once_and_a_motion(case, more, message):
     rig, tracks = case
     if more.pop("still", False):
         tracks = [np.tile(track[:1], (150, 1)) for track in tracks]
+    tracks = [*tracks[:2], tracks[0]] if more.pop("twice", False) else tracks
+    one, two, three = rig.cameras
+    rig = vl.Rig([one, replace(two, image_size=more.pop("size", two.image_size)), three])
     with pytest.raises(ValueError, match=message):
         vl.discover_from_tracks(tracks, rig, **more)
     with pytest.raises(ValueError, match="names: must be one per track, got 1 for 3"):

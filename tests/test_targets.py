@@ -48,6 +48,10 @@ def found(films):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(vl.vision, "track_targets", seen)
+        with pytest.raises(
+            ValueError, match=r"got \(0, 4, 0\) .* where \(0, 0, 0\) do: give those"
+        ):
+            vl.observe(paths, rig, targets=2, lags=(0, 4, 0))
         return vl.discover_from_videos(paths, rig.uncalibrated(keep=0), targets=2, degree=1)
 
 

@@ -148,7 +148,9 @@ def check_array(name: str, values: Any, names: Sequence[str] = ()) -> Floats:
             )
         elif isinstance(first, np.timedelta64 | timedelta):
             advice = ": give seconds, np.array(t, 'timedelta64[us]') / np.timedelta64(1, 's')"
-        if array.dtype.kind not in "iufO" or isinstance(first, str | bool):
+        # Beside numbers a boolean becomes one.
+        told = [first] if isinstance(values, np.ndarray) else np.asarray(values, object).flat
+        if array.dtype.kind not in "iufO" or any(isinstance(one, str | bool) for one in told):
             raise TypeError
         return np.ma.filled(array.astype(float, copy=False), np.nan)
     except MALFORMED:
@@ -192,20 +194,22 @@ def check_tracks(tracks: Sequence[ArrayLike], cameras: int | None = None) -> lis
     return checked
 
 
-def check_times(t: ArrayLike) -> Floats:
+def check_times(t: ArrayLike, name: str = "t") -> Floats:
     """Finite, increasing times, at least one, shape (n,)."""
-    t = check_array("t", t)
+    t = check_array(name, t)
     if t.ndim != 1 or not len(t):
-        raise ValueError(f"t: must hold at least one time, with shape (n,), got shape {t.shape}")
+        raise ValueError(
+            f"{name}: must hold at least one time, with shape (n,), got shape {t.shape}"
+        )
     if not np.isfinite(t).all():
-        raise ValueError(f"t: must be finite, got {t[~np.isfinite(t)][0]}")
+        raise ValueError(f"{name}: must be finite, got {t[~np.isfinite(t)][0]}")
     if (np.diff(t) <= 0).any():
         row = int(np.flatnonzero(np.diff(t) <= 0)[0])
         digits = 17 if t[row] == t[row + 1] else 6
-        pair = f"t[{row}] = {t[row]:.{digits}g} before t[{row + 1}] = {t[row + 1]:.{digits}g}"
+        pair = " before ".join(f"{name}[{i}] = {t[i]:.{digits}g}" for i in (row, row + 1))
         single = digits == 17 and np.array_equal(t, t.astype(np.float32))
         advice = ", equal in single precision: give t in float64, or from zero" if single else ""
-        raise ValueError(f"t: must increase, got {pair}{advice}")
+        raise ValueError(f"{name}: must increase, got {pair}{advice}")
     return t
 
 

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any, cast
 
@@ -36,6 +37,8 @@ from .checks import (
 from .dynamics import Discovery, Library, Quantity, Round, Swing
 from .progress import bar
 from .vision import Hint, TrackFile
+
+_BEYOND = 0.1  # share of an image by which a tenth of the places may lie beyond it
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,6 +251,16 @@ def observe_tracks(
                 f"tracks: must be in pixels, got {name} with all places between -1 and 1: if they "
                 f"are shares of the image multiply them by its size, {camera.image_size}"
             )
+        seen, size = track[np.isfinite(track).all(axis=1)], np.array(camera.image_size)
+        beyond = np.maximum(-seen, seen - size)
+        # Some places of a tracker may be wild, and some beyond the border by part of the target.
+        if np.mean((beyond > _BEYOND * size).any(axis=1)) > _BEYOND:
+            i = beyond.max(axis=1).argmax()
+            raise ValueError(
+                f"tracks: must lie in the image of their camera, image_size = {camera.image_size}, "
+                f"got {name} with places such as ({seen[i, 0]:.5g}, {seen[i, 1]:.5g}): give the "
+                "image_size of the video to the rig, or check which track is whose"
+            )
     cleared = [without_wild(*each) for each in zip(raw, names, strict=True)]
     raw, said = [track for track, _ in cleared], [wild for _, wild in cleared]
     if isinstance(lags, str):
@@ -268,8 +281,17 @@ def _observed(
     doubts: Sequence[str] = (),
     progress: bool | None = None,
     synchronous: bool = False,
+    before: Floats | int = 0,
 ) -> Observation:
-    """What the tracks of videos of these names tell, with the tracker's doubts about them."""
+    """What the tracks of videos of these names tell, with the tracker's doubts about them.
+
+    The lags count from those before, which the tracks are aligned by.
+    """
+    for (i, one), (j, other) in combinations(enumerate(raw), 2):
+        if np.array_equal(one, other, equal_nan=True):
+            pair = f"{names[i]} and {names[j]} with the same places"
+            message = f"tracks: must be of another film for each camera, got {pair}"
+            raise Refused(message, "track", raw)
     films = Footage.of(raw, lags, clock.rates, clock.frames)
     rig, affine = cameras.paced(rig, clock.rates), None
     if not rig.is_measured:
@@ -303,9 +325,10 @@ def _observed(
         with refusing("lags", raw, names):
             best = cameras.learn_lags(raw, rig, clock.rates, lags, clock.frames, progress=progress)
             if lags is not None and _apart(lags, best, 0.5):  # frames
+                given, right = (cameras.list_lags(each + before) for each in (lags, best.frames))
                 raise ValueError(
-                    f"lags: must make the views agree, got ({cameras.list_lags(lags)}) frames "
-                    f"where ({cameras.list_lags(best.frames)}) do: leave them out, or check them"
+                    f"lags: must make the views agree, got ({given}) frames, none counting as 0, "
+                    f"where ({right}) do: give those, or check the films"
                 )
     told = best if lags is None else replace(best, frames=lags, errors=0 * lags, warnings=())
     tracks = replace(films, lags=told.frames, rates=best.rates).aligned
@@ -374,7 +397,7 @@ def _several_observed(
     t, step = clock.times, np.diff(clock.times).min()
     later = (t[-1] - t[0] + 2 * step) * np.arange(count)[:, None]
     long = Clock.of_tracks((np.append(t, t[-1] + step) + later).ravel()[:-1], rows)
-    seen = _observed(rows, rig, long, 0 * begun, names, (*doubts, *unsure), progress)
+    seen = _observed(rows, rig, long, 0 * begun, names, (*doubts, *unsure), progress, before=begun)
     modes = [cameras.side_by_side(mode, count) for mode in seen.systematic]
     x = cameras.side_by_side(seen.x, count)
     lost = np.flatnonzero(np.isnan(x).any(axis=1))
@@ -566,13 +589,15 @@ def _rig_warnings(
         if worst <= cameras.DISAGREEMENT:
             return [
                 "the lags that are given differ from those of the tracks: "
-                f"({cameras.list_lags(lags)}) for {told} frames: leave them out, or check"
+                f"({cameras.list_lags(lags)}) for {told} frames: give those, or check"
             ]
         advice, where = f"the lags {told} would explain it best", " at the lags that are given"
     elif (why := cameras.explain(tracks, given, learned)) is not None and (
         few or why.left <= max(cameras.GROSS / 2, worst / 3)
     ):
         advice = f"{why.text(names)} would explain it best"
+    elif not few and (alone := _contradicted(tracks, given)) is not None:
+        advice = f"without {names[alone]} the others agree: check what it shows, or leave it out"
     elif not few and cameras.smooth(tracks, learned):
         advice = (
             "no single cause explains it; check the positions and normals, the scales and angles "
@@ -588,6 +613,18 @@ def _rig_warnings(
         f"the rig does not agree with the tracks{where}: in one frame of ten, tracked and "
         f"reconstructed target lie more than {sizes} pixels apart: {advice}"
     ]
+
+
+def _contradicted(tracks: Sequence[Floats], given: Rig) -> int | None:
+    """The one of four or more tracks without which the others agree, if there is one."""
+    left = {}
+    for i in range(len(tracks)) if len(tracks) > 3 else ():
+        others = [j for j in range(len(tracks)) if j != i]
+        with suppress(ValueError):
+            rest, rig = [tracks[j] for j in others], Rig(tuple(given.cameras[j] for j in others))
+            left[i] = max(cameras.disagreement(rest, cameras.learn_cameras(rest, rig)))
+    best = min(left, key=lambda i: left[i], default=-1)
+    return best if left.get(best, np.inf) <= cameras.GROSS / 2 else None
 
 
 # ---------------------------------------------------------------------------------------- the law

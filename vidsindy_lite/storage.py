@@ -114,7 +114,7 @@ def read_tree(name: str, path: Path, suffix: str) -> Any:
     ValueError
         If it is none, or nested too deeply.
     """
-    kind = f"a {suffix[1:].upper()} file"
+    kind = f"a {suffix[1:].upper()} file{' of OpenCV' * (suffix not in ('.json', '.toml'))}"
     text = read_text(name, path, kind)
     with reading(name, path, kind):
         if suffix == ".json" and '"opencv-matrix"' not in text:
@@ -126,7 +126,8 @@ def read_tree(name: str, path: Path, suffix: str) -> Any:
         try:
             storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         except (cv2.error, SystemError):
-            raise ValueError("OpenCV cannot read it, which reads what it writes") from None
+            keys = ", ".join(re.findall(r"^<?(\w+)[^:>\n]*[:>]", text, re.MULTILINE)[:5])
+            raise ValueError(f"OpenCV cannot read it, which holds {keys or 'no keys'}") from None
         try:
             return _plain(storage.root())
         finally:

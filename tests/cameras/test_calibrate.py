@@ -333,7 +333,9 @@ normal_error = 2
     ("old", "new", "message"),
     [
         ("looks_at = ", "normal = [1, 0, 0]\nlooks_at = ", "looks_at: must be given with a pos"),
-        ("field_of_view = 60", "field_of_view = 180", "field_of_view: must be between 0 and 180"),
+        ("field_of_view = 60", "field_of_view = 180", "field_of_view: must be between 5 and 180"),
+        ("field_of_view = 60", "field_of_view = 1.05", r"degrees \(not radians; .*, got 1.05"),
+        ("position = [", "position = [0, 0, 0] # ", "looks_at: must be another place than the pos"),
         ("field_of_view = 60", "scale = 1\nfield_of_view = 60", "in place of scale and angle"),
         ("field_of_view = 60", "", "roll: must be given with a field_of_view"),
         ("looks_at = ", "# ", "normal: must be"),

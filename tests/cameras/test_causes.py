@@ -99,6 +99,9 @@ def test_what_was_measured_with_an_error_is_not_blamed():
         replace(c, normal_error=0.0, position_error=0.0, scale_error=0.0) for c in measured.cameras
     )
     assert explain(tracks, exact, learn_cameras(tracks, exact)) is not None
+    tracks[2] = tracks[2][::-1]
+    told = vl.observe_tracks(tracks, rig, FRAMES / 30, lags="synchronous", names=NAMES)
+    assert ": without c.mp4 the others agree" in told.warnings[0]
 
 
 VIEWS = ("A", "B", "C")

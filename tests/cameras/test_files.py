@@ -12,6 +12,7 @@ from vidsindy_lite.__main__ import main
 from vidsindy_lite.cameras import read_calibration
 
 SIZE = (1280, 720)
+EYE, K = [1, 0, 0, 0, 1, 0, 0, 0, 1], '"K": [9, 0, 5, 0, 9, 5, 0, 0, 1]'
 POINTS = np.random.default_rng(0).uniform(-0.5, 0.5, (50, 3))
 
 
@@ -199,6 +200,11 @@ def test_the_command_line(tmp_path, capsys):
         ("distortions = [", "distortions = [1, 1, 1, 1, ", "distortion: must be at most 8 finite"),
         ("size = [ 1280, 720,]", "size = [ 1280 ]", r"size: must be .* of shape \(2,\), got"),
         ("rotation = [", "rotation = ['a', ", "R: must be an array of real numbers, got"),
+        (
+            "rotation = ",
+            "rvec = [0, 0, 0]\nrotation = ",
+            "cam_0: rvec: must be the same as rotation",
+        ),
         ("rotation = ", "rotation = [0, 90, 0] # ", "R: must be a rotation in radians, got"),
     ],
 )
@@ -220,7 +226,7 @@ def test_malformed_tables_are_refused_by_name(tmp_path, old, new, message):
         ("a.csv", "nan,2\n" * 11, "must hold finite numbers"),
         ("a.csv", "0,0\n" * 11, "must be of a camera at a finite place"),
         ("a.json", "{", "must be a JSON file"),
-        ("a.yml", "no yaml: [", "OpenCV cannot read it, which reads what"),
+        ("a.yml", "no yaml: [", "of OpenCV, got .*: OpenCV cannot read it, which holds no"),
         ("a.npz", "PK\x03\x04 no archive", "must be a .npz file of numbers"),
         ("a.mat", "x", "must end in .toml, .* or .txt, got '.*a.mat'"),
         ("a.toml", "a = " + "9" * 400, "must hold numbers of less than 300 digits, got 999"),
@@ -228,11 +234,23 @@ def test_malformed_tables_are_refused_by_name(tmp_path, old, new, message):
         ("a.json", '{"P": 5}', "must hold 11 DLT coefficients"),
         (
             "a.json",
-            '{"K": [9, 0, 5, 0, 9, 5, 0, 0, 1], "R": [2, 0, 0, 0, 1, 0, 0, 0, 1], "t": [0, 0, 1]}',
-            "R: must be a rotation, got a matrix that is none",
+            f'{{{K}, "R": {[2, *EYE[1:]]}, "t": [0, 0, 1]}}',
+            "R: must be .*, got one off by 3",
         ),
+        ("a.json", f'{{{K}, "R": {EYE}, "rvec": [0, 1, 0], "t": 0}}', "of rvec, got one 1 radians"),
+        (
+            "a.json",
+            f'{{{K}, "R": {EYE}, "t": [0, 0, 1], "size": [9, 9]}}',
+            "size: must be .*80, 720",
+        ),
+        ("a.json", '{"P1": [[1, 0, 0, 0]], "Q": 2}', r"or P, got \['P1', 'Q'\] in"),
+        ("a.txt", "# ID, MODEL\n1 OPENCV 1280\n", "could not convert string to float: 'OPENCV'"),
         ("a.json", '{"K": "x", "R": 1, "t": 2}', "K: must be an array of real numbers"),
-        ("a.json", '{"K": [9, 0, 0.5, 0, 9, 0.5, 0, 0, 1], "R": 1, "t": 2}', "K: must be in pix"),
+        (
+            "a.json",
+            '{"K": [9, 0, 0.5, 0, 9, 0.5, 0, 0, 1], "R": 1, "t": 2}',
+            "K: must have its prin",
+        ),
         ("a.npy", "\udc93NUMPY\x01\0v\0{'descr'", "must be a .npy file of numbers"),
         ("a.xml", "<?xml", "must be a XML file"),
         ("a.yaml", "", "must be a YAML file"),
@@ -274,7 +292,7 @@ def test_other_lenses_are_refused_by_name(tmp_path, key, value):
     ("key", "value"),
     [
         ("model", "pinhole"), ("camera_model", "OPENCV"), ("distortion_model", "plumb_bob"),
-        ("fisheye_model", 0), ("fisheye", "false"),
+        ("fisheye_model", 0), ("fisheye", "false"), ("distortion_coefficients", None),
     ],
 )  # fmt: skip
 def test_our_lens_under_its_names(tmp_path, key, value):

@@ -338,8 +338,13 @@ def test_the_times_of_each_track_are_checked():
     assert clock.ends.tolist() == [5.0, 3.5]  # by the clock of the first
     short = Clock.of_tracks([[0, 2, 4], [7]], [np.zeros((3, 2)), np.zeros((1, 2))])
     assert short.rates.tolist() == [1, 2]
-    with pytest.raises(ValueError, match=r"t: must have shape \(5,\), one per row of tracks\[1\]"):
-        Clock.of_tracks([range(4), range(4)], tracks)
+    for times, message in (
+        (range(4), r"must have shape \(5,\), one per row of tracks\[1\]"),
+        (range(5, 0, -1), r"must increase, got t\[1\]\[0\] = 5 before t\[1\]\[1\] = 4"),
+        (range(0, 105, 21), "must be in the unit .* of the others, got median steps of 1, 21"),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=rf"^t\[[01]\]: {message}"):
+            Clock.of_tracks([range(4), times], tracks)
     # One clock for all of them.
     clock = Clock.of_tracks([3.0, 3.5, 4.0], [np.zeros((3, 2)), np.zeros((5, 2))])
     assert clock.times.tolist() == [3.0, 3.5, 4.0]

@@ -501,7 +501,12 @@ def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Cause | None:
     most, what, freed = max(ranked, key=lambda one: one[0], default=(0.0, "", errors > 0))
     if most == 0:
         return None
-    return Cause(what, freed, adjust(footage, start, np.where(freed, np.inf, errors)))
+    found = adjust(footage, start, np.where(freed, np.inf, errors))
+    # A camera that leaves the scene of all of them behind agrees with whatever it was shown.
+    scene = np.vstack([near.points, *(np.asarray(camera.position) for camera in start)])
+    moved = np.linalg.norm(found.change[:, PARTS["position"]], axis=1).max()
+    far = moved > np.linalg.norm(np.nanmax(scene, axis=0) - np.nanmin(scene, axis=0))
+    return None if far else Cause(what, freed, found)
 
 
 def smooth(tracks: Sequence[Floats], learned: Rig) -> bool:

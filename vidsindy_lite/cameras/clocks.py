@@ -25,6 +25,7 @@ INSTANTS = 300  #: At which views are compared before all frames are.
 OVERLAP = 0.5  #: Share of the shorter of two videos that both must show.
 _FARTHEST = 1e9  # frames by which a video may start later; and ...
 _FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
+_UNLIKE = 20.0  # times as long as another's that a track's frames may last by its times
 
 
 @dataclass(frozen=True)
@@ -357,10 +358,16 @@ class Clock:
             times = _one_each(cast("ArrayLike", t), len(tracks[0]), "row of tracks[0]")
             return cls(times, np.ones(len(tracks)), check_clocks(None, tracks))
         stated = [
-            _one_each(one, len(track), f"row of tracks[{i}]")
+            _one_each(one, len(track), f"row of tracks[{i}]", f"t[{i}]")
             for i, (one, track) in enumerate(zip(t, tracks, strict=True))
         ]
         usual = np.array([np.median(np.diff(times)) if len(times) > 1 else 1 for times in stated])
+        if usual.max() > _UNLIKE * usual.min():
+            i = np.abs(np.log(usual / np.median(usual))).argmax()
+            steps = ", ".join(f"{step:.3g}" for step in usual)
+            raise ValueError(
+                f"t[{i}]: must be in the unit of time of the others, got median steps of {steps}"
+            )
         frames = [(times - times[0]) / step for times, step in zip(stated, usual, strict=True)]
         # Times that are that close to even ones are even.
         frames = [np.rint(f) if np.abs(f - np.rint(f)).max() < 1e-6 else f for f in frames]
@@ -403,11 +410,11 @@ def _is_even(frames: Floats) -> bool:
     return bool((frames == np.arange(len(frames))).all())
 
 
-def _one_each(t: ArrayLike, frames: int, each: str) -> Floats:
+def _one_each(t: ArrayLike, frames: int, each: str, name: str = "t") -> Floats:
     """The time of each frame of a video."""
-    times = check_times(t)
+    times = check_times(t, name)
     if times.shape != (frames,):
-        raise ValueError(f"t: must have shape ({frames},), one per {each}, got {times.shape}")
+        raise ValueError(f"{name}: must have shape ({frames},), one per {each}, got {times.shape}")
     return times
 
 

@@ -35,7 +35,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from itertools import chain
+from itertools import chain, combinations
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +85,8 @@ BETTER = 1.25  #: Ratio of residuals from which on more unknowns are worth it.
 GROSS = 4.0  #: Pixels; real calibrations of real tracks leave up to half of that.
 _FEWEST = 3  # cameras of which nothing is measured
 _MOST = 100  # cameras of a template
+_ROUNDED = 1e-5  # by which a rotation may be off in a calibration file
+_NARROWEST = 5.0  # degrees: less is rather meant in radians
 _LOOKS = ("looks_at", "field_of_view", "roll")  # keys that a hand can measure
 _TEXTS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 _KEYS: dict[str, Any] = _TEXTS["keys"]
@@ -512,14 +514,19 @@ def _by_hand(known: dict[str, Any], model: str) -> dict[str, Any]:
             raise ValueError("looks_at: must be given with a position and without a normal")
         position = check_vector("position", known["position"], 3)
         known["normal"] = position - check_vector("looks_at", aim, 3)
+        if not known["normal"].any():
+            raise ValueError(f"looks_at: must be another place than the position, got {aim}")
     if across is not None:
         if model == OrthographicCamera.model or "scale" in known or "angle" in known:
             raise ValueError(
                 "field_of_view: must be given in place of scale and angle, perspective"
             )
         width = check_image_size(known.get("image_size", Camera.image_size))[0]
-        if not 0 < check_number("field_of_view", across) < 180:
-            raise ValueError(f"field_of_view: must be between 0 and 180 degrees, got {across:g}")
+        if not _NARROWEST <= check_number("field_of_view", across) < 180:
+            raise ValueError(
+                f"field_of_view: must be between {_NARROWEST:g} and 180 degrees (not radians; of a "
+                f"longer lens give scale and angle), got {across:g}"
+            )
         known["scale"] = 2 * np.tan(np.deg2rad(across) / 2) / width
         leans = check_number("roll", 0.0 if roll is None else roll)
         if "normal" in known:
@@ -593,7 +600,8 @@ def read_calibration(
             found = list(_cameras(content, size, told))
         if not found:
             raise ValueError(
-                f"paths: must hold a camera matrix (K), DLT coefficients or P, got none in '{path}'"
+                "paths: must hold a camera matrix (K), DLT coefficients or P, got "
+                f"{shown([*content])} in '{path}'"
             )
         cameras += found
         warnings += [f"{path.name}: {one}" for one in told]
@@ -610,7 +618,7 @@ def _content(path: Path) -> Any:
     if suffix in (".csv", ".txt"):
         text = read_text("paths", path, "a table")
         comma = "." if re.search(r";[ \t]*[-+\d]", text) else " "  # as spreadsheets write decimals
-        lines = text.replace(",", comma).replace(";", " ").splitlines()
+        lines = re.sub("#.*", "", text).replace(",", comma).replace(";", " ").splitlines()
         with reading("paths", path, "rows of as many numbers each"):
             rows = [line.split() for line in lines if line.strip()]
             if len(lengths := {len(row) for row in rows}) > 1:
@@ -638,11 +646,14 @@ def _cameras(
 
 def _size_of(table: dict[str, Any], given: tuple[int, int] | None) -> tuple[int, int]:
     """Width and height that a table states, or that are given."""
-    size = given if table.get("size") is None else table["size"]
-    if size is None:
+    stated = table.get("size", given)
+    if stated is None:
         raise ValueError("image_size: must be given (--size WxH), as this file does not say")
-    width, height = _shaped("size", size, (2,))
-    return check_image_size((round(width), round(height)))
+    width, height = _shaped("size", stated, (2,))
+    size = check_image_size((round(width), round(height)))
+    if given not in (None, size):
+        raise ValueError(f"size: must be the image_size that is given, {given}, got {size}")
+    return size
 
 
 def _tables(content: Any, name: str, warnings: list[str]) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -655,13 +666,12 @@ def _tables(content: Any, name: str, warnings: list[str]) -> Iterator[tuple[str,
             yield from _tables(part, f"{name or 'camera '}[{i}]: ".replace(": [", "["), warnings)
     if not isinstance(content, Mapping):
         return
-    lower = {str(key).lower(): value for key, value in content.items()}
+    lower = {str(key).lower(): value for key, value in content.items() if value is not None}
     for part in ("intrinsics", "extrinsics"):
         if isinstance(lower.get(part), Mapping):
             lower |= {str(key).lower(): value for key, value in lower.pop(part).items()}
-    known = {
-        ours: lower[other] for ours, others in _NAMES.items() for other in others if other in lower
-    }
+    given = {ours: [key for key in keys if key in lower] for ours, keys in _NAMES.items()}
+    known = {ours: lower[keys[0]] for ours, keys in given.items() if keys}
     is_camera = "K" in known or "P" in known
     ignored = [key for key in lower if key in _MARKS and _is_set(lower[key]) == _MARKS[key]]
     if ignored:
@@ -674,6 +684,10 @@ def _tables(content: Any, name: str, warnings: list[str]) -> Iterator[tuple[str,
         for key, part in content.items():
             yield from _tables(part, f"camera {key}: ", warnings)
         return
+    for one, other in chain.from_iterable(combinations(keys, 2) for keys in given.values()):
+        if not np.array_equal(lower[one], lower[other]):
+            told = " and ".join(shown(lower[key]) for key in (one, other))
+            raise ValueError(f"{name}{one}: must be the same as {other}, got {told}")
     sides = next((sides for sides in _KEYS["sides"] if set(sides) <= set(lower)), ())
     if sides and "size" not in known:
         known["size"] = [lower[side] for side in sides]
@@ -707,7 +721,8 @@ def _check_lens(key: str, value: Any, name: str, warnings: list[str]) -> None:
         raise ValueError(f"{name}{key}: must be 0, got {shown(value)}")
     if np.isscalar(value) and ("fisheye" in key or (_LENS.search(key) and _OTHERS.search(named))):
         raise ValueError(f"{name}{key}: must be none but of a lens {_LENSES}, got {shown(value)}")
-    if re.fullmatch(r"[kp][1-6]|skew", key) or ("dist" in key and key not in _KNOWN):
+    alone = np.isscalar(value) and re.fullmatch(r"[kp][1-6]|skew", key)  # P1 may be a matrix
+    if alone or ("dist" in key and key not in _KNOWN):
         raise ValueError(f"{name}{key}: must stand in dist, {_LENSES}, got {shown(value)}")
     if _LENS.search(key) and not str(value).lower().startswith(tuple(_KEYS["lenses"])):
         warnings.append(f"{name}{key} = {shown(value)} is taken for a lens {_LENSES}")
@@ -753,8 +768,9 @@ def _decomposed(table: dict[str, Any], name: str, warnings: list[str]) -> Iterat
 
 def _camera(table: dict[str, Any]) -> PerspectiveCamera:
     """The camera of a table with K, R, t, size, and what else there is."""
+    table = {"R": table.get("rvec", ())} | table
     for key in ("K", "R", "t"):
-        if table.get(key) is None or not np.size(table[key]):
+        if not np.size(table.get(key, ())):
             raise ValueError(f"{key}: must be given ({', '.join(_NAMES[key])}), got none")
     inner = _shaped("K", table["K"], (3, 3))
     if inner[0, 0] <= 0 or inner[1, 1] <= 0 or np.abs(inner[2] - [0, 0, 1]).max() > 1e-12:
@@ -762,18 +778,17 @@ def _camera(table: dict[str, Any]) -> PerspectiveCamera:
     skew = abs(inner[0, 1] / inner[1, 1]) * inner[1, 2]
     if skew > ROUNDING:
         raise ValueError(f"K: must have no skew, got {inner[0, 1]:g}")
-    if (np.abs(inner[:2, 2]) <= 1).all():
-        raise ValueError(f"K: must be in pixels from the image's corner, got {inner.tolist()}")
-    turned = check_array("R", table["R"])
-    if turned.size == 3:
-        axis = _shaped("R", turned, (3,))
-        if np.linalg.norm(axis) > 2 * np.pi:
-            raise ValueError(f"R: must be a rotation in radians, got {axis.tolist()}")
-        rotation = Rotation.from_rotvec(axis).as_matrix()
-    else:
-        rotation = _shaped("R", turned, (3, 3))
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-5 or np.linalg.det(rotation) < 0:
-            raise ValueError("R: must be a rotation, got a matrix that is none")
+    middle, size = inner[:2, 2], table["size"]
+    # What P leads to may lie anywhere, and matters to no lens.
+    if "P" not in table and ((middle <= 1) | (middle >= np.array(size) - 2)).any():
+        raise ValueError(
+            "K: must have its principal point in pixels, in the image, of width and height "
+            f"{size}, got {middle.tolist()}"
+        )
+    rotation = _rotation("R", table["R"])
+    other = rotation if (rvec := table.get("rvec")) is None else _rotation("rvec", rvec)
+    if (apart := Rotation.from_matrix(rotation @ other.T).magnitude()) > _ROUNDED:
+        raise ValueError(f"R: must be the rotation of rvec, got one {apart:.2g} radians from it")
     dist = np.trim_zeros(check_array("dist", table.get("dist", [])).ravel(), "b")
     camera = PerspectiveCamera(
         scale=1 / inner[0, 0],
@@ -783,6 +798,21 @@ def _camera(table: dict[str, Any]) -> PerspectiveCamera:
         distortion=dist if dist.size else None,
     )
     return camera.posed(rotation, _shaped("t", table["t"], (3,)))
+
+
+def _rotation(name: str, value: ArrayLike) -> Floats:
+    """The matrix of a rotation, which may be given as that of Rodrigues."""
+    turned = check_array(name, value)
+    if turned.size == 3:
+        axis = _shaped(name, turned, (3,))
+        if np.linalg.norm(axis) > 2 * np.pi:
+            raise ValueError(f"{name}: must be a rotation in radians, got {axis.tolist()}")
+        return np.asarray(Rotation.from_rotvec(axis).as_matrix())
+    turned = _shaped(name, turned, (3, 3))
+    off = max(np.abs(turned @ turned.T - np.eye(3)).max(), 1 - np.linalg.det(turned))
+    if off > _ROUNDED:
+        raise ValueError(f"{name}: must be a rotation to {_ROUNDED:g}, got one off by {off:.1g}")
+    return turned
 
 
 def _shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:

@@ -23,6 +23,7 @@ from .models import Camera, at_once, independent, intersect, missed
 from .rig import ALIKE, Rig
 
 _SHORTEST = 4  # frames of a run, and of what two runs have in common
+_ENOUGH = 60  # frames from which the cameras are learned
 _AHEAD, _DEGREE = 6, 4  # frames on both sides of a gap, through which a target goes like t^4
 
 
@@ -150,22 +151,27 @@ def _cameras(views: Sequence[Floats], runs: Sequence[_Run], rig: Rig) -> tuple[C
             f"{_SHORTEST} frames, got no such frames"
         )
     common = np.flatnonzero((which == sets[counts.argmax()]).all(axis=1))
+    common = common[:: -(-len(common) // _ENOUGH)]
     places = [view[common] for view in views]
     orders = list(permutations(range(views[0].shape[1])))
-    tried = []
-    for order in product(orders[:1], *[orders] * (len(views) - 1)):
-        here = [place[:, list(o)] for place, o in zip(places, order, strict=True)]
-        with suppress(ValueError):
-            learned = learn_cameras(_rows(here), rig).cameras
-            tried.append((_misfit(here, learned), learned))
-    tried.sort(key=lambda one: one[0])
+    ways: list[tuple[tuple[int, ...], ...]] = [(orders[0],)]
+    for count in range(2, len(views) + 1):  # of views, one after the other
+        ways, tried = [(*way, order) for way, order in product(ways, orders)], []
+        for way in ways:
+            here = [place[:, list(order)] for place, order in zip(places, way, strict=False)]
+            with suppress(ValueError):
+                learned = learn_cameras(_rows(here), Rig(rig.cameras[:count])).cameras
+                tried.append((_misfit(here, learned), way, learned))
+        tried.sort(key=lambda one: one[0])
+        # Where some views leave the cameras open more may not.
+        ways = [way for size, way, _ in tried if size <= ALIKE * tried[0][0]] or ways
     if not tried or (len(tried) > 1 and not tried[0][0] * ALIKE < tried[1][0]):
-        sizes = ", ".join(f"{size:.2g}" for size, _ in tried[:2]) or "none"
+        sizes = ", ".join(f"{size:.2g}" for size, *_ in tried[:2]) or "none"
         raise ValueError(
             "targets: one order of the targets in the views must fit the rig far better than all "
             f"others, got residuals of {sizes} px for the best"
         )
-    return tried[0][1]
+    return tried[0][2]
 
 
 def _rows(views: Sequence[Floats]) -> list[Floats]:
