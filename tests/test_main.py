@@ -67,9 +67,7 @@ def here(folder, tmp_path, monkeypatch):
         (["--rig", "rig.toml", "--degree", "2", "--library", "fourier(1)"], "a library, got 2"),
     ],
 )
-def test_bad_commands_are_told_in_one_line_before_anything_is_tracked(
-    here, capsys, options, message
-):
+def test_bad_commands_are_told_in_one_line_before_it_is_tracked(here, capsys, options, message):
     videos = ["discover", "a.avi", "b.avi", "c.avi"] if options[0].startswith("--") else []
     assert main([*videos, *options]) == 2
     shown = capsys.readouterr()

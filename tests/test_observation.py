@@ -102,9 +102,8 @@ def test_the_tilt_of_a_rig_measured_by_hand_is_no_force():
 
 def bob(t):
     """The angle of a pendulum of half a metre."""
-    return solve_ivp(
-        lambda _, y: [y[1], -19.62 * np.sin(y[0])], (0, 5), [1, 0], t_eval=t, rtol=1e-9
-    ).y[0]
+    how = {"t_eval": t, "rtol": 1e-9}
+    return solve_ivp(lambda _, y: [y[1], -19.62 * np.sin(y[0])], (0, 5), [1, 0], **how).y[0]
 
 
 @pytest.mark.parametrize(

@@ -81,11 +81,7 @@ def untracked(monkeypatch):
         ({"paths": "a.mkv"}, {}, "paths: must be a list, one per camera .* got 'a.mkv'"),
         ({"paths": ["a.mkv", None, "c.mkv"]}, {}, r"paths\[1\]: must be the name of a file"),
         ({"paths": ["\udcff.mkv"] * 3}, {}, r"paths\[0\]: must be made of characters, got"),
-        (
-            {"paths": ["a.mkv", "b.mkv", "a.mkv"]},
-            {},
-            "paths: must be another video .* got 'a.mkv' 2",
-        ),
+        ({"paths": ["a.mkv", "b.mkv", "a.mkv"]}, {}, "paths: must be another .* got 'a.mkv' 2"),
         ({}, {"degree": 0}, "degree: must be an integer of at least 1, got 0"),
         ({}, {"library": "fourier(1)"}, "library: must be of type Library, got 'fourier"),
         ({}, {"origin": "home"}, "origin: must be one of learn, data, got 'home'"),
@@ -96,9 +92,7 @@ def untracked(monkeypatch):
         ({"t": np.arange(200)[::-1]}, {}, "t: must increase"),
     ],
 )
-def test_what_is_cheap_is_checked_before_a_video_is_tracked(
-    shot, untracked, arguments, options, message
-):
+def test_what_is_cheap_is_checked_before_tracking(shot, untracked, arguments, options, message):
     given = {"paths": shot.paths, "rig": shot.rig} | arguments
     with pytest.raises(ValueError, match=message):
         vl.discover_from_videos(**given, **options)

@@ -136,9 +136,7 @@ PARTS = {
         ("companion/pages.py", "DIGITS = 5\n", True, False),
     ],
 )
-def test_the_hash_follows_code_and_data(
-    tmp_path, monkeypatch, file, content, counts, counts_for_results
-):
+def test_the_hash_follows_content(tmp_path, monkeypatch, file, content, counts, counts_for_results):
     monkeypatch.setattr(storage, "PACKAGE", tmp_path)
 
     def hashes():

@@ -219,9 +219,7 @@ TROUBLES = {
     "the target's motion must determine": nothing_in_common,
     "the rig does not agree with the tracks": wrong_position,
     "the lags of the videos cannot be told": repeating,
-    "the lags that are given differ from those of the tracks": lambda studio: studio.says(
-        lags=(0, 0.2, 0)
-    ),
+    "the lags that are given differ from those of the tracks": lambda s: s.says(lags=(0, 0.2, 0)),
     "must make the views agree": lambda studio: studio.says(lags=(0, 5, 0)),
     "the curve misses the data": lambda studio: pendulum(degree=1),
     "another law may as well be true": undecided,

@@ -284,9 +284,7 @@ def test_what_eq_4_needs(small):
 
 @pytest.mark.parametrize("model", ["orthographic", "perspective"])
 @pytest.mark.parametrize(("cameras", "apart"), [(2, 120), (3, 120), (5, 72)])
-def test_a_template_is_a_rig_with_a_calibrated_camera_evenly_around(
-    tmp_path, cameras, apart, model
-):
+def test_a_template_is_a_rig_with_a_known_camera_evenly_around(tmp_path, cameras, apart, model):
     path = tmp_path / "rig.toml"
     path.write_text(rig_template(cameras, model, (640, 480)), encoding="utf-8")
     placed = vl.Rig.load(path).cameras
@@ -322,9 +320,8 @@ normal_error = 2
         np.testing.assert_allclose(middle, (320, 240), atol=1e-9)
         lean = np.deg2rad(roll)
         long = 641 / 2 / 3  # pixels of one metre at three metres
-        np.testing.assert_allclose(
-            above - middle, long * np.array([-np.sin(lean), -np.cos(lean)]), atol=1e-9
-        )
+        upright = long * np.array([-np.sin(lean), -np.cos(lean)])
+        np.testing.assert_allclose(above - middle, upright, atol=1e-9)
         np.testing.assert_allclose(np.linalg.norm(side - middle), 3 * long, rtol=1e-12)
         assert camera.normal_error == 2
 

@@ -61,9 +61,7 @@ def toml(parts, head="cam_{}", matrix=False):
     return text + "[metadata]\nadjusted = false\nerror = 0.5\n"
 
 
-@pytest.mark.parametrize(
-    ("head", "matrix"), [("cam_{}", False), ("cam_0{}", True), ("cameras.{}", False)]
-)
+@pytest.mark.parametrize(("head", "matrix"), [("cam_{}", 0), ("cam_0{}", 1), ("cameras.{}", 0)])
 def test_anipose_pose2sim_and_caliscope(tmp_path, head, matrix):
     parts = rooms(0)
     (tmp_path / "a.toml").write_text(toml(parts, head, matrix), encoding="utf-8")
@@ -200,11 +198,7 @@ def test_the_command_line(tmp_path, capsys):
         ("distortions = [", "distortions = [1, 1, 1, 1, ", "distortion: must be at most 8 finite"),
         ("size = [ 1280, 720,]", "size = [ 1280 ]", r"size: must be .* of shape \(2,\), got"),
         ("rotation = [", "rotation = ['a', ", "R: must be an array of real numbers, got"),
-        (
-            "rotation = ",
-            "rvec = [0, 0, 0]\nrotation = ",
-            "cam_0: rvec: must be the same as rotation",
-        ),
+        ("rotation = ", "rvec = [0, 0, 0]\nrotation = ", "rvec: must be the same as rotation"),
         ("rotation = ", "rotation = [0, 90, 0] # ", "R: must be a rotation in radians, got"),
     ],
 )
@@ -232,25 +226,13 @@ def test_malformed_tables_are_refused_by_name(tmp_path, old, new, message):
         ("a.toml", "a = " + "9" * 400, "must hold numbers of less than 300 digits, got 999"),
         ("a.toml", "a = \udc80", "must be a TOML file in UTF-8, got 'a.toml', which is none"),
         ("a.json", '{"P": 5}', "must hold 11 DLT coefficients"),
-        (
-            "a.json",
-            f'{{{K}, "R": {[2, *EYE[1:]]}, "t": [0, 0, 1]}}',
-            "R: must be .*, got one off by 3",
-        ),
+        ("a.json", f'{{{K}, "R": {[2, *EYE[1:]]}, "t": [0, 0, 1]}}', "R: .* got one off by 3"),
         ("a.json", f'{{{K}, "R": {EYE}, "rvec": [0, 1, 0], "t": 0}}', "of rvec, got one 1 radians"),
-        (
-            "a.json",
-            f'{{{K}, "R": {EYE}, "t": [0, 0, 1], "size": [9, 9]}}',
-            "size: must be .*80, 720",
-        ),
+        ("a.json", f'{{{K}, "R": {EYE}, "t": [0, 0, 1], "size": [9, 9]}}', "size: .*80, 720"),
         ("a.json", '{"P1": [[1, 0, 0, 0]], "Q": 2}', r"or P, got \['P1', 'Q'\] in"),
         ("a.txt", "# ID, MODEL\n1 OPENCV 1280\n", "could not convert string to float: 'OPENCV'"),
         ("a.json", '{"K": "x", "R": 1, "t": 2}', "K: must be an array of real numbers"),
-        (
-            "a.json",
-            '{"K": [9, 0, 0.5, 0, 9, 0.5, 0, 0, 1], "R": 1, "t": 2}',
-            "K: must have its prin",
-        ),
+        ("a.json", '{"K": [9, 0, 0.5, 0, 9, 0.5, 0, 0, 1], "R": 1, "t": 2}', "K: must have its"),
         ("a.npy", "\udc93NUMPY\x01\0v\0{'descr'", "must be a .npy file of numbers"),
         ("a.xml", "<?xml", "must be a XML file"),
         ("a.yaml", "", "must be a YAML file"),

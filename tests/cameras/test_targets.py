@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import vidsindy_lite as vl
-from vidsindy_lite.cameras import identify
+from vidsindy_lite.cameras import identify, targets
 
 FRAMES = 240
 BLIND = 7  # frames around a meeting in which a view loses the targets
@@ -75,6 +75,15 @@ def test_a_meeting_that_one_view_alone_does_not_see_costs_its_frames_only(twin):
         seen = np.isfinite(told[i]).all(axis=1)
         assert seen.sum() == FRAMES - 10 * (i == 1)
         np.testing.assert_allclose(told[i][seen], expected[seen])
+
+
+def test_each_of_many_views_adds_the_orders_of_its_own_targets(monkeypatch):
+    rig, tried = room(np.random.default_rng(5), 4), []
+    learned = lambda *given: tried.append(given) or vl.learn_cameras(*given)  # noqa: E731
+    monkeypatch.setattr(targets, "learn_cameras", learned)
+    paths = [walk(np.arange(FRAMES) + start) for start in (0, 700, 1900)]
+    identify([np.hstack([camera.project(x) for x in paths]) for camera in rig.cameras], rig)
+    assert len(tried) == 3 * 6
 
 
 def two_walks(seed):

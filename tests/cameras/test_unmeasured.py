@@ -73,11 +73,9 @@ def test_small_lags_are_learned_beside():
     assert aligned_error(seen.x[inside], x[inside]) < 0.005 * np.ptp(x, axis=0).max()
 
 
-def of_lenses(rig, times):
+def of_lenses(rig, by):
     """The same views, by lenses so many times as long, from so many times as far."""
-    return vl.Rig(
-        replace(c, position=times * c.position, scale=c.scale / times) for c in rig.cameras
-    )
+    return vl.Rig(replace(c, position=by * c.position, scale=c.scale / by) for c in rig.cameras)
 
 
 def blind(rig, known=0):
@@ -186,13 +184,11 @@ def test_noise_makes_no_fractions_of_whole_lags(seed):
 def test_lags_that_others_fit_as_well_are_doubted():
     rng = np.random.default_rng([77, 12, 2])
     rig = vl.Rig(replace(c, image_size=(1280, 2400)) for c in of_lenses(room(rng), 12).cameras)
-    tracks = [
-        track + 1.5 * rng.normal(size=track.shape) for track in shot(rng, rig, FRAMES, (0, 5, -3))
-    ]
+    tracks = shot(rng, rig, FRAMES, (0, 5, -3))
+    tracks = [track + 1.5 * rng.normal(size=track.shape) for track in tracks]
     doubt = "the lags of the videos cannot be told: "
-    assert any(
-        text.startswith(doubt) for text in observe_tracks(tracks, blind(rig), FRAMES / FPS).warnings
-    )
+    seen = observe_tracks(tracks, blind(rig), FRAMES / FPS)
+    assert any(text.startswith(doubt) for text in seen.warnings)
     told = factorised(Footage.of(far_away(4)[0]), far_away(4)[1])
     assert told.lags.warnings == ()
 
