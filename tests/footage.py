@@ -24,7 +24,7 @@ class Phone:
     colour: tuple[int, int, int] = (215, 30, 35)
     flicker: float = 0.0
     noise: float = 2.0
-    shadow: bool = False
+    shadow: float = 0.0  # 1: well apart; half of that touches the target
     leaves: bool = False
     camera: str = "fixed"
     image_size: tuple[int, int] = (640, 480)
@@ -117,7 +117,8 @@ def render_phone(phone: Phone, seed: int = 0):
             image, size = window.copy(), phone.size * scale[k]
             centre = places[k] + margin - low
             if phone.shadow:
-                _paint(image, _disc(centre + [0.9 * size + 12, 0.8 * size + 10], size), None, 0.8)
+                apart = phone.shadow * np.array([0.9 * size + 12, 0.8 * size + 10])
+                _paint(image, _disc(centre + apart, size), None, 0.8)
             _paint(image, _disc(centre, size), phone.colour)
             total += image / 4
         window[:] = total

@@ -13,6 +13,7 @@ import hashlib
 import json
 import os
 import re
+import time
 import tomllib
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterator, Mapping
@@ -246,6 +247,7 @@ LIBRARIES = (
 )  # fmt: skip
 #: Folders and modules of the package that compute no result of a sweep.
 RESULTLESS = ("companion", "plots", "__main__")
+_READ = time.time_ns()  # when the code of this process was read
 
 
 def repository_root(start: str | os.PathLike | None = None) -> Path:
@@ -275,6 +277,11 @@ def library_versions() -> list[str]:
     """The libraries that results depend on and that are installed, e.g. "numpy 2.4.6"."""
     installed = {found.name.lower(): found.version for found in metadata.distributions()}
     return [f"{name} {installed[name]}" for name in LIBRARIES if name in installed]
+
+
+def edited() -> bool:
+    """Whether code of the package was written since this process read it: it may run either."""
+    return any(file.stat().st_mtime_ns > _READ for file in PACKAGE.rglob("*.py"))
 
 
 @cache

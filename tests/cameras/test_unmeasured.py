@@ -202,6 +202,14 @@ def test_views_of_different_things_do_not_agree():
         vl.observe_tracks(tracks, rig, np.arange(120) / FPS)
 
 
+def test_few_frames_in_which_all_agree_by_chance_are_told():
+    rng = np.random.default_rng(4)
+    rig = room(rng, 4)
+    films = Footage.of(shot(rng, rig, FRAMES, (0, 30, -30, 5)))
+    (doubt,) = factorised(films, lenses(rng, rig)).lags.warnings
+    assert "views agree on one motion but for" in doubt
+
+
 def test_views_with_nothing_in_common_and_what_stands_still_tell_nothing():
     tracks, rig = far_away()
     told = factorised(Footage.of(tracks, LAGS[:3]), rig, synchronous=True)

@@ -317,10 +317,11 @@ SMALL = {"image_size": (320, 240), "frames": 60}
 @pytest.mark.parametrize(
     "phone",
     [
-        Phone("bricks", 14, shadow=True, **SMALL),
+        Phone("bricks", 14, shadow=1, **SMALL),
+        Phone("wood", 14, shadow=0.5, colour=(140, 105, 115), **SMALL),
         Phone("wood", 16, camera="held", flicker=0.03, colour=(240, 240, 235), **SMALL),
     ],
-    ids=["shadow", "held"],
+    ids=["shadow", "shadow that touches it", "held"],
 )
 def test_phone_footage(tmp_path, phone):
     truth, _ = write_phone(tmp_path / "clip.mp4", phone, 1)

@@ -7,6 +7,7 @@ import struct
 import subprocess
 import sys
 import wave
+import weakref
 from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
@@ -548,3 +549,12 @@ def test_reduced_pixels_are_means_the_last_row_and_column_repeated(factor):
     steps = {2: 1, 3: 1, 4: 2, 6: 2, 8: 3}[factor]
     np.testing.assert_allclose(video.reduce(image, factor), means, atol=0.51 * steps)
     assert video.reduce(image, 1) is image
+
+
+def test_the_frames_of_a_film_leave_the_memory_with_it(tmp_path):
+    frames = np.zeros((4, 40, 60, 3), np.uint8)
+    film = video.Reel(write_video(tmp_path / "film.mkv", iter(frames)), 480)
+    assert len(list(film)) == len(list(film)) == 4
+    gone = weakref.ref(film.whole)
+    del film  # and no cycle waits for the garbage collector
+    assert gone() is None

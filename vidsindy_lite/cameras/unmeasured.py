@@ -84,7 +84,8 @@ def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True) -> Rig:
         if not synchronous:
             errors[1:, PARTS["lag"]] = np.inf
         fit = adjust(footage, cameras, errors, most=_STEPS)
-        if np.isfinite(fit.misses).any():
+        apart = np.ptp(np.array([c.position for c in fit.cameras[:2]]), axis=0)
+        if np.isfinite(fit.misses).any() and apart.any():
             fits.append(fit)
     best = min(fits, key=lambda fit: fit.noise, default=None)
     if best is None or best.noise > most:

@@ -35,7 +35,7 @@ from uuid import uuid4
 from tqdm import tqdm
 
 from ..checks import MALFORMED
-from ..storage import PACKAGE, RESULTLESS, code_hash, repository_root, write_file
+from ..storage import PACKAGE, RESULTLESS, code_hash, edited, repository_root, write_file
 from ..values import decoded, encoded
 
 Task = TypeVar("Task")
@@ -229,8 +229,16 @@ def _files(function: Callable, tasks: list) -> dict[int, Path]:
         root = repository_root(PACKAGE)
     except FileNotFoundError:
         return {}
+    if edited():
+        warnings.warn("no result is stored or taken, as the code was edited since this session "
+                      "began: start it anew", stacklevel=4)  # fmt: skip
+        return {}
     named = os.environ.get("VIDSINDY_CACHE")
-    cache = Path(named) if named else root / "build" / "cache"
+    cache = Path(named).expanduser() if named else root / "build" / "cache"
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(f"VIDSINDY_CACHE: must be a folder or a new one, got {error}") from None
     module = function.__module__.removeprefix(f"{PACKAGE.name}.")
     folder = cache / code_hash(RESULTLESS) / f"{module}.{function.__name__}"
     names = [hashlib.sha256(repr(task).encode()).hexdigest()[:32] for task in tasks]

@@ -321,12 +321,12 @@ class Trial:
         check_choice("condition", self.condition, CONDITIONS)
         check_choice("method", self.method, METHODS)
         check_choice("source", self.source, SOURCES)
-        if check_number("level", self.level) < 0 or (self.level == 0) != (
-            self.condition == "clean"
-        ):
+        clean, gaps = self.condition == "clean", self.condition in ("blocks", "fibers")
+        level = check_number("level", self.level)
+        if level < 0 or (level == 0) != clean or (gaps and level >= 1):
             raise ValueError(
-                "level: must be 0 in the condition 'clean' and above 0 in all others, "
-                f"got {self.level} in {self.condition!r}"
+                "level: must be 0 in the condition 'clean', above 0 in all others, and a share of "
+                f"the samples below 1 of blocks and fibers, got {self.level} in {self.condition!r}"
             )
 
     @property

@@ -20,7 +20,7 @@ from torch.optim import lr_scheduler
 from tqdm import trange
 
 from ..arrays import Floats, Floats32, Image
-from ..checks import check_integer, check_path
+from ..checks import check_integer, check_output
 from ..storage import library_versions, write_file, write_json
 from .rendering import BACKGROUNDS, COLOURS, Box, LabelledFrame, Scene, draw_frames
 from .tracking import WEIGHTS
@@ -305,7 +305,13 @@ def train(
     log : dict
         Seed, numbers of steps, frames and parameters, loss curve, what was trained on, versions.
     """
-    weights = check_path("weights", weights)
+    weights = check_output("weights", weights)
+    beside = weights.with_suffix(".json")
+    if weights.suffix != ".pt" or (beside.exists() and not weights.exists()):
+        raise ValueError(
+            "weights: must be a .pt file, beside which a .json of its name is free for its log, "
+            f"got '{weights}'"
+        )
     seed, steps = check_integer("seed", seed), check_integer("steps", steps, 1)
     with torch.random.fork_rng():
         torch.manual_seed(seed)
@@ -328,7 +334,7 @@ def train(
     torch.save(network.state_dict(), memory)
     write_file(weights, memory.getvalue())
     log = _training_log(seed, losses, sum(p.numel() for p in network.parameters()))
-    write_json(weights.with_suffix(".json"), log)
+    write_json(beside, log)
     return log
 
 

@@ -22,6 +22,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from pickle import UnpicklingError
+from threading import Lock
 from typing import NamedTuple
 
 import cv2
@@ -182,13 +184,16 @@ class LearnedDetector:
 
         from .network import Network
 
-        network = Network()
-        network.load_state_dict(torch.load(check_file("weights", weights), weights_only=True))
+        network, file = Network(), check_file("weights", weights)
+        try:
+            network.load_state_dict(torch.load(file, weights_only=True))
+        except (*MALFORMED, UnpicklingError):
+            raise ValueError(f"weights: must be written by train-detector, got '{file}'") from None
         self.network = network.eval().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def predict(self, image: Image) -> Predictions:
         """Predictions, (5, n), for an image (height, width, 3) uint8, red, green and blue."""
-        return self.predict_all(image[None])[0]
+        return self.predict_all(_colours(image)[None])[0]
 
     def predict_all(self, images: Image) -> Predictions:
         """Predictions, (b, 5, n), for images of one size: many small ones are quicker at once."""
@@ -203,6 +208,13 @@ class LearnedDetector:
             found = self.network(as_input(np.pad(images, margins, "edge")))
             found[:, 4].sigmoid_()
         return found.numpy()
+
+
+def _colours(image: Image) -> Image:
+    """An image as detectors take it."""
+    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3 or not image.size:
+        raise ValueError(f"image: must be (height, width, 3) of uint8, got {shown(image)}")
+    return image
 
 
 class OnnxDetector:
@@ -239,18 +251,20 @@ class OnnxDetector:
                 f"input in '{self.path}'"
             )
         self.height, self.width = map(int, shape.pop())
+        self._one = Lock()  # of two threads, each would get the other's answers
 
     def predict(self, image: Image) -> Predictions:
         """Predictions, (5, n), for an image (height, width, 3) uint8, red, green and blue."""
-        height, width = image.shape[:2]
+        height, width = _colours(image).shape[:2]
         scale = min(self.height / height, self.width / width)
         size = round(scale * width), round(scale * height)
         left, top = (self.width - size[0]) // 2, (self.height - size[1]) // 2
         margins = (top, self.height - size[1] - top, left, self.width - size[0] - left)
         resized = cv2.resize(image, size, interpolation=cv2.INTER_LINEAR)
         padded = cv2.copyMakeBorder(resized, *margins, cv2.BORDER_CONSTANT, value=(114,) * 3)
-        self.network.setInput(cv2.dnn.blobFromImage(padded, 1 / 255))
-        found = np.asarray(self.network.forward(), np.float32)
+        with self._one:
+            self.network.setInput(cv2.dnn.blobFromImage(padded, 1 / 255))
+            found = np.array(self.network.forward(), np.float32)
         if found.ndim != 3 or len(found) != 1 or not 5 <= found.shape[1] <= found.shape[2]:
             raise ValueError(
                 "detector: must give one array of shape (1, 4 + classes, anchors), "
