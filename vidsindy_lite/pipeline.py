@@ -301,7 +301,8 @@ def _observed(
                 tracks = replace(films, lags=far.lags.frames).aligned
                 warnings = (*far.lags.warnings, *doubts)
                 affine = _concluded(raw, tracks, far.rig, far.lags, clock, [], warnings, far.places)
-                if len(far.variance) < 3:  # parallel projections of a plane tell of no lens
+                # Parallel projections of a plane tell of no lens.
+                if len(far.variance) < 3 and not far.lags.warnings:
                     return affine
             for begun in (films.lags,) if far is None else (films.lags, far.lags.frames):
                 try:

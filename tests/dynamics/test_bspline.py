@@ -35,9 +35,6 @@ def test_bad_breakpoints_are_refused(breakpoints):
         clamped_knots(breakpoints)
 
 
-# ---------------------------------------------------------------------------------------- smoothing
-
-
 def test_few_samples_have_a_smoothing_spline_of_scipys():
     rng = np.random.default_rng(4)
     t = np.cumsum(rng.uniform(0.5, 1.5, 22))
@@ -48,9 +45,6 @@ def test_few_samples_have_a_smoothing_spline_of_scipys():
         for penalty in PENALTIES
     ]
     assert np.abs(ours - scipys).max(axis=1).min() < 1e-6
-
-
-# -------------------------------------------------------------------------------------- collocation
 
 
 @pytest.fixture
@@ -130,9 +124,6 @@ def test_a_fit_says_how_it_ended(problem, state):
     assert problem.objective(further.state) <= problem.objective(done.state)
 
 
-# -------------------------------------------------------------------------------- sparse regression
-
-
 def objective(information, pull, penalty, support):
     """Lowest value on a support, from the definition."""
     inside = np.flatnonzero(support)
@@ -195,9 +186,6 @@ def test_inverse_of_badly_scaled_and_of_no_information():
         variance = np.diag(inverse(np.diag([4.0, 0.0])))
     assert variance[0] == pytest.approx(0.25)
     assert 1e200 < variance[1] < np.inf
-
-
-# ----------------------------------------------------------------- the law in the frame of the data
 
 
 @pytest.mark.parametrize("distance", [0.3, 2.9, 3.1, 6.0])

@@ -138,9 +138,6 @@ def test_random_pushes_that_nobody_named_are_a_misfit():
     assert any("times the noise estimated beforehand" in warning for warning in found.warnings)
 
 
-# ------------------------------------------------------------------------------------ other origins
-
-
 def moved(flow, origin, error, level, draw=0, n=1500):
     """The law of a flow around an origin, and what is found in a draw of an error."""
     truth = FLOWS[flow].shift(origin)

@@ -206,9 +206,6 @@ def test_what_no_equation_tells_is_refused(library, order, words):
     assert "\n" not in str(refused.value)
 
 
-# -------------------------------------------------------------------- errors that all samples share
-
-
 def distorted(name, seed, size):
     """A clean trajectory seen through a slightly wrong linear map, and what the map may be."""
     rng = np.random.default_rng(seed)

@@ -63,9 +63,6 @@ def test_what_vanishes_with_an_origin_pins_no_coefficient():
     assert (found.standard_errors[both] > 0.1 * found.native_standard_errors[both]).all()
 
 
-# ----------------------------------------------------------------------- to use a law, and keep it
-
-
 def test_a_law_predicts_slopes_and_paths(spring):
     law, t, found = spring
     x = np.array([[2.5, 0.5], [1.0, -1.0]])
@@ -179,9 +176,6 @@ def test_functions_that_the_law_has_not_may_be_missing(pendulum, tmp_path):
     assert str(again).startswith(pendulum.equations())
     again.save(tmp_path / "copy")
     assert str(vl.Discovery.load(tmp_path / "copy", HELD)) == str(pendulum)
-
-
-# ----------------------------------------------------------------------------------------- the path
 
 
 def test_every_plateau_is_drawn_and_the_law_is_marked_where_it_holds(found):

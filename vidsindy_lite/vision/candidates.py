@@ -235,13 +235,14 @@ def candidates(
         strength = lengths(changes(frame, ground, lit)) / allowed * known
         lighter, some = strength.copy(), strength > 1  # without shadows
         lighter[some] = np.where(shadowed(frame[some], ground[some] * lit), 1, strength[some])
-        witnesses = [(strength, 1.0), (lighter, 1.0)]
+        levels = 1.0, 2.5, 6.0  # tolerances by which what is connected differs
+        witnesses = [(lighter, 2.5, 1.0), *((strength, level, 1.0) for level in levels)]
         if others:
-            witnesses.append((_from_neighbours(frame, others, plate.moves) / allowed, 0.7))
+            near = _from_neighbours(frame, others, plate.moves) / allowed
+            witnesses += [(near, level, 0.7) for level in levels]
         one = _distinct(Candidates.joined(
-            components(strength, level, frame, ground, worth, bare)
-            for strength, worth in witnesses
-            for level in (1.0, 2.5, 6.0)  # tolerances by which what is connected differs
+            components(differs, level, frame, ground, worth, bare)
+            for differs, level, worth in witnesses
         ))  # fmt: skip
         found.append(one._replace(frame=one.frame + i, place=carry(here, one.centre),
                                   colour=one.colour / lit))  # fmt: skip
