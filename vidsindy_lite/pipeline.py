@@ -304,7 +304,8 @@ def _observed(
                 # Parallel projections of a plane tell of no lens.
                 if len(far.variance) < 3 and not far.lags.warnings:
                     return affine
-            for begun in (films.lags,) if far is None else (films.lags, far.lags.frames):
+            tried = [films.lags, *([far.lags.frames] if far and lags is None else [])]
+            for begun in tried:
                 try:
                     rig = cameras.posed(replace(films, lags=begun).aligned, rig, lags is not None)
                     break
