@@ -210,7 +210,8 @@ caption = "Misfit of held-out samples by the weights of spline-ADO, in percent o
 save_figure("study_weights", fig, caption=caption, numbers=numbers, tolerance=0.3)
 
 # %% [markdown]
-# *Misfit of the samples that were held out, in percent of the spread of the motion: geometric means over the systems.*
+# *Misfit of the samples that were held out, in percent of the spread of the motion: geometric means over the systems. It hardly
+# tells the two smaller values of $\beta$ apart.*
 #
 # ## All methods, all systems
 #
