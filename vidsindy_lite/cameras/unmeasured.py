@@ -383,11 +383,13 @@ def _beyond(images: Floats, rank: int) -> Floats:
     Two views contradict a lag as well as all, and a chance that all agree in few frames.
     """
     middle, _, axes = _spread(images)
-    seen, left = np.isfinite(images), np.full_like(images, np.nan)
-    for shown in np.unique(seen, axis=0):
+    off, left = images - middle, np.full_like(images, np.nan)
+    bits = 1 << np.arange(images.shape[1] // 2)
+    seen = np.isfinite(images[:, ::2]) @ bits
+    for views in set(seen.tolist()):
+        shown = np.repeat(views & bits > 0, 2)
         if shown.sum() >= 4:
-            part = np.ix_((seen == shown).all(axis=1), shown)
+            part = np.ix_(seen == views, shown)
             along, _ = np.linalg.qr(axes[:rank, shown].T)
-            off = (images - middle)[part]
-            left[part] = off - off @ along @ along.T
+            left[part] = off[part] - off[part] @ along @ along.T
     return left
