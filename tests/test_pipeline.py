@@ -81,7 +81,11 @@ def untracked(monkeypatch):
         ({"paths": "a.mkv"}, {}, "paths: must be a list, one per camera .* got 'a.mkv'"),
         ({"paths": ["a.mkv", None, "c.mkv"]}, {}, r"paths\[1\]: must be the name of a file"),
         ({"paths": ["\udcff.mkv"] * 3}, {}, r"paths\[0\]: must be made of characters, got"),
-        ({"paths": ["a.mkv", "b.mkv", "a.mkv"]}, {}, "paths: must be another .* got 'a.mkv' 2"),
+        (
+            {"paths": ["a.mkv", "b.mkv", "a.mkv"]},
+            {},
+            "paths: must be another video .* got 'a.mkv' 2",
+        ),
         ({}, {"degree": 0}, "degree: must be an integer of at least 1, got 0"),
         ({}, {"library": "fourier(1)"}, "library: must be of type Library, got 'fourier"),
         ({}, {"origin": "home"}, "origin: must be one of learn, data, got 'home'"),

@@ -326,7 +326,9 @@ def test_a_table_of_the_track_and_the_frames_that_count(tmp_path, capsys):
         with pytest.raises(ValueError, match="detector: must be given with a film, got throw.csv"):
             vl.discover_from_video(table, STICK, **wrong)
     table.write_text("u1,v1,u2,v2\n1,2,3,4\n5,6,7,9\n")
-    with pytest.raises(ValueError, match="path: throw.csv must hold the track of one .* 2 cam"):
+    with pytest.raises(
+        ValueError, match="path: throw.csv must hold the track of one camera, .* 2 cam"
+    ):
         vl.discover_from_video(table, STICK, fps=30)
 
 
@@ -394,9 +396,6 @@ def test_what_does_not_go_together_is_refused(tmp_path, monkeypatch, capsys, giv
     assert main(["rig-template", "--output", "rig.toml"]) == 0
     assert main(["discover", "a.mov", *given]) == 2
     assert message in capsys.readouterr().err
-
-
-# --------------------------------------------------------------------------------------- real clips
 
 
 def test_the_toss():

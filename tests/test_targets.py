@@ -145,7 +145,9 @@ def test_a_film_that_shows_fewer_is_refused_with_all_tracks():
         check_found([both, one], ["a.mov", "b.mov"], 2, [[], []])
     assert refused.value.step == "track"
     assert len(refused.value.tracks) == 2
-    with pytest.raises(Refused, match="b.mov must show one .*, got none in any frame: no red; w"):
+    with pytest.raises(
+        Refused, match="b.mov must show one .*, got none in any frame: no red; what m"
+    ):
         check_found([both[:, :2], one[:, 2:]], ["a.mov", "b.mov"], 1, [[], ["no red"]])
     check_found([both, both], ["a.mov", "b.mov"], 2, [[], []])
 

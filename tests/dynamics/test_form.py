@@ -265,7 +265,7 @@ RUNS, CURVE = [(T, X), (T, -X)], np.ones((2, 200, 2))
         ({"t": RUNS, "x": None, "sigma": [0.1] * 3}, "sigma: must be one per .*, got 3 for 2"),
         ({"origin": "here"}, "origin: must be one of learn, data, got 'here'"),
         ({"t": [(T, X), (T, X * [1, np.nan])], "x": None}, "in all trajectories or in none, got c"),
-        ({"t": [(T, frame("a", "b")), (2 * T, frame("b", "a"))], "x": None}, "must be named alike"),
+        ({"t": [(T, frame("a", "b")), (2 * T, frame("b", "a"))], "x": None}, "be named alike in"),
         ({"sigma": frame("y", "b")}, "sigma: must be named like the variables, .'x', 'y'., got"),
         ({"t": [*RUNS, (T, X)], "x": None}, "must hold each run once, got trajectory 0 again as 2"),
         ({"t": [(T, X), (999 * T, X)], "x": None}, "one unit in all .*, got steps of 0.1"),

@@ -137,5 +137,7 @@ def test_bad_input():
         told(FALL, [0, 1, 4, 5], down=[0, 0, 1])
     with pytest.raises(ValueError, match="down: must be a direction"):
         told(FALL, [0, 1, 4, 5], down=[0, 0])
-    with pytest.raises(KeyError, match=r"the law says \(g, direction, drag\), got 'period'"):
+    with pytest.raises(
+        KeyError, match=r"of what the law says \(g, direction, drag\), got 'period'"
+    ):
         told(FALL, [0, 1, 4, 5])["period"]

@@ -308,9 +308,6 @@ def test_many_frames_that_show_only_a_part_are_told(part):
     assert any("only a part of the target" in doubt for doubt in told) == (part > 8)
 
 
-# --------------------------------------------------------------------------------------- telephones
-
-
 SMALL = {"image_size": (320, 240), "frames": 60}
 
 
@@ -387,9 +384,6 @@ def test_the_green_ball_before_a_hand_held_phone():
     found = track(real("pendulum"))
     assert np.isfinite(found.pixels).all(axis=1).mean() > 0.8
     assert not any("followed by its looks alone" in doubt for doubt in found.warnings)
-
-
-# -------------------------------------------------------------------------------------------- hints
 
 
 @pytest.mark.parametrize(

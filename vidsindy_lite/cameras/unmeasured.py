@@ -257,10 +257,11 @@ def factorised(films: Footage, rig: Rig, synchronous: bool = False) -> Factorise
     if not np.isfinite(least):
         return None
     images = _images(films, best, range(count))
+    off, beyond = (_beyond(images, r) for r in (0, rank))
     moved, missed = (
-        np.nanmean((_beyond(images, r) ** 2).reshape(-1, count, 2), axis=(0, 2)) for r in (0, rank)
+        np.nanmean((each**2).reshape(-1, count, 2), axis=(0, 2)) for each in (off, beyond)
     )
-    left = _left(films, best, range(count), rank)
+    left = _noise(beyond, rank)
     # Times what is left by which a target must move, rms, in every view.
     if not (moved > 5.0**2 * missed).all():
         return None
@@ -269,9 +270,8 @@ def factorised(films: Footage, rig: Rig, synchronous: bool = False) -> Factorise
     downs = np.split(np.sqrt(count) * axes[:3].T, count)
     places, shapes = np.split(middle, count), [camera.image_size for camera in rig.cameras]
     cameras = tuple(map(AffineCamera.of, downs, places, shapes))
-    doubts, steps = [], np.diff(_beyond(images, rank), axis=0)
-    noise = float(np.sqrt(np.nanmean(steps**2) / 2 / (1 - rank / (2 * count))))
-    if left > min(GROSS, max(ALIKE * noise, 10 * FINE)):  # what lasts is no noise
+    doubts, rough = [], _noise(np.diff(beyond, axis=0), rank) / np.sqrt(2)
+    if left > min(GROSS, max(ALIKE * rough, 10 * FINE)):  # what lasts is no noise
         doubts.append(
             f"views agree on one motion but for {left:.2g} pixels: noisy tracks, cameras too near "
             "for parallel projections, or a view of another time or of something else"
@@ -295,13 +295,13 @@ def _left(footage: Footage, lags: Floats, places: Sequence[int], rank: int) -> f
     step = footage.span / max(len(footage.instants) - 1, 1)
     if count <= images.shape[1] or count * step < _least(footage):
         return np.inf
-    beyond = _beyond(images, rank)
-    return float(np.sqrt(np.nansum(beyond**2) / _freedom(beyond, rank)))
+    return _noise(_beyond(images, rank), rank)
 
 
-def _freedom(beyond: Floats, rank: int) -> int:
-    """How many of these numbers are free."""
-    return int(np.maximum(np.isfinite(beyond).sum(axis=1) - rank, 0).sum())
+def _noise(beyond: Floats, rank: int) -> float:
+    """Of the pixels, by what is left of them beyond a rank, so many of each row being free."""
+    free = np.maximum(np.isfinite(beyond).sum(axis=1) - rank, 0).sum()
+    return float(np.sqrt(np.nansum(beyond**2) / free))
 
 
 def _best(
@@ -359,7 +359,7 @@ def _polished(footage: Footage, lags: Floats, rank: int) -> tuple[Floats, Floats
     left, errors = beyond(found.x), np.full(count - 1, np.inf)
     information = found.jac.T @ found.jac
     if np.linalg.cond(information) <= 1 / np.finfo(float).eps:
-        variance = lasting(left) * np.nansum(left**2) / _freedom(left, rank)
+        variance = lasting(left) * _noise(left, rank) ** 2
         errors = np.sqrt(variance * np.diag(np.linalg.inv(information)))
     return np.append(0.0, found.x), np.append(0.0, errors)
 
