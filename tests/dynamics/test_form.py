@@ -268,7 +268,7 @@ RUNS, CURVE = [(T, X), (T, -X)], np.ones((2, 200, 2))
         ({"t": [(T, frame("a", "b")), (2 * T, frame("b", "a"))], "x": None}, "be named alike in"),
         ({"sigma": frame("y", "b")}, "sigma: must be named like the variables, .'x', 'y'., got"),
         ({"t": [*RUNS, (T, X)], "x": None}, "must hold each run once, got trajectory 0 again as 2"),
-        ({"t": [(T, X), (999 * T, X)], "x": None}, "one unit in all .*, got steps of 0.1"),
+        ({"t": [(T, X), (60 * T, X)], "x": None}, "one unit in all .*, got steps of 0.1"),
         ({"x": frame("a", "a")}, "x: columns must have names of their own, got .'a', 'a'."),
     ],
 )

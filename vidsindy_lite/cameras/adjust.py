@@ -171,6 +171,8 @@ class Adjustment:
     settled : bool
         Whether the search came to its end, after so many ...
     steps : int
+    rung : int
+        Which damping it took to come here.
     """
 
     given: Footage
@@ -181,6 +183,7 @@ class Adjustment:
     reach: float = 1.0
     settled: bool = False
     steps: int = 0
+    rung: int = 0
 
     @cached_property
     def cameras(self) -> tuple[Camera, ...]:
@@ -420,13 +423,14 @@ def _downhill(state: Adjustment) -> tuple[Adjustment | None, float]:
 
     here = cost(state)
     # Until a step leads downhill: fine where focal length and distance hardly differ.
-    for damping in (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2):
-        damped = np.vstack((triangle, np.sqrt(damping) * np.eye(len(size))))
+    dampings = (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2)
+    for rung in range(max(state.rung - 1, 0), len(dampings)):
+        damped = np.vstack((triangle, np.sqrt(dampings[rung]) * np.eye(len(size))))
         step = np.linalg.lstsq(damped, aim, rcond=1e-13)[0] / size
         step /= max(np.abs(step[lags]).max(initial=0), 1.0)  # a lag's slope holds for a frame
         change, points = state.change.copy(), state.points + reduced.own + reduced.follow @ step
         change[free] += step
-        moved = replace(state, change=change, points=points)
+        moved = replace(state, change=change, points=points, rung=rung)
         if cost(moved) <= here * (1 + 1e-12) + 1e-18:
             told = seen.any(axis=1)
             shift = np.sqrt(np.mean((reduced.slopes[told] @ step) ** 2)) if told.any() else 0.0

@@ -16,7 +16,7 @@ from ..checks import FARTHEST, check_array, check_items, check_times, labels, sh
 
 #: Lag-1 autocorrelation, in standard errors of white noise, from which on errors are dependent.
 CHANCE = 4.0
-MOST_APART = 100.0  #: Median steps of runs over each other: beyond, one is in other units.
+MOST_APART = 50.0  #: Median steps of runs over each other: beyond, as of minutes, units differ.
 #: Times (n,) and states (n, d), NaN where a coordinate was not seen; in each row one was.
 Trajectory = tuple[Floats, Floats]
 
