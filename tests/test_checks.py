@@ -102,6 +102,7 @@ def test_messages_name_the_remedy():
         ((differences, x), r"give seconds, np.array\(t, 'timedelta64\[us\]'\) / np.timedelta64"),
         (((1.7e9 + t).astype(np.float32), x), "equal in single precision: give t in float64"),
         ((t, x[:, 0]), r"got \(60,\): one coordinate is a column, x\[:, None\]"),
+        (([t, t], [x, x]), r"got \(2, 60, 2\): several runs are a list of pairs, discover"),
         (([(t, x), (t, x), (t, np.nan * x), (t, x)],), "60 rows of NaN, in trajectory 2"),
         ((t, pd.DataFrame({"time": t, "x": x[:, 0]})), "got the times as column 'time'"),
         ((t, pd.DataFrame({"x": t, "q": "1"})), r"x: 'q' \(str\): must be an array of real numb"),

@@ -273,7 +273,8 @@ class Holder:
           for f in (lambda task: task, Scene.random, wait_for, len)],
         *[(video_info, task, 1, "tasks: each must be a frozen dataclass .* got ")
           for task in (1, Scene, Changeable(), Holder(np.ones(3)), Holder([1]))],
-        (video_info, Scene(), 0, "jobs: must be at least 1, got 0"),
+        *[(video_info, Scene(), jobs, f"jobs: must be an integer of at least 1, got {jobs!r}")
+          for jobs in (0, "2")],
     ],
 )  # fmt: skip
 def test_what_no_sweep_can_do_is_refused(cache, function, task, jobs, message):

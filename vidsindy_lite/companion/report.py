@@ -32,7 +32,7 @@ from matplotlib.figure import Figure
 
 from ..arrays import Floats, Image
 from ..cameras import DISAGREEMENT, Rig, stacked
-from ..checks import check_path
+from ..checks import check_instance, check_path
 from ..dynamics import Discovery, Swing
 from ..pipeline import Refused, Stopped, VideoDiscovery
 from ..progress import bar
@@ -148,6 +148,7 @@ def write_report(
         If there is not one video per camera, or the folder holds files of these names that are none
         of a report.
     """
+    check_instance("found", found, VideoDiscovery)
     if paths is not None and len(paths) != len(found.rig.cameras):
         raise ValueError(f"paths: must be {len(found.rig.cameras)} videos, got {len(paths)}")
     content = summary(found, paths, options)

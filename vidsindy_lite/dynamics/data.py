@@ -52,7 +52,10 @@ def _check_samples(t: Floats, x: Floats) -> Trajectory:
     """The same of all rows in which a coordinate was seen."""
     t, x = check_array("t", t), check_array("x", x)
     if x.ndim != 2 or x.shape[1] < 1:
-        advice = ": one coordinate is a column, x[:, None]" if x.ndim == 1 and len(x) else ""
+        advice = {
+            1: ": one coordinate is a column, x[:, None]",
+            3: ": several runs are a list of pairs, discover([(t, x), ...])",
+        }.get(x.ndim if x.size else 0, "")
         raise ValueError(f"x: must have shape (n, d) with d of at least 1, got {x.shape}{advice}")
     if t.shape != (len(x),):
         raise ValueError(f"t: must have shape ({len(x)},) as x has {len(x)} rows, got {t.shape}")

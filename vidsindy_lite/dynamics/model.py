@@ -579,6 +579,7 @@ class PolynomialSystem:
     def _right(self, j: int, terms: Sequence[str], digits: int, fraction: str, times: str) -> str:
         """The right-hand side of an equation, given terms without slopes and how it is written."""
         column = self.coefficients[:, j]
+        check_integer("digits", digits, 1)
         above = sum_text(np.where(self.implicit, 0.0, column), terms, digits, times)
         below = np.where(self.implicit, -column, 0.0)
         if not below.any():

@@ -34,7 +34,7 @@ from uuid import uuid4
 
 from tqdm import tqdm
 
-from ..checks import MALFORMED
+from ..checks import MALFORMED, check_integer, check_items
 from ..storage import PACKAGE, RESULTLESS, code_hash, edited, repository_root, write_file
 from ..values import decoded, encoded
 
@@ -88,7 +88,7 @@ def sweep(
     RuntimeError
         If a worker of the cluster has other code of this package.
     """
-    tasks = list(tasks)
+    tasks = list(check_items("tasks", tasks))
     _check(function, tasks, jobs)
     address = dask or os.environ.get("VIDSINDY_DASK")
     files = _files(function, tasks)
@@ -138,8 +138,7 @@ def _check(function: Callable, tasks: list, jobs: int) -> None:
                 "tasks: each must be a frozen dataclass of numbers, text and tuples of them, "
                 f"got {task!r}"
             )
-    if jobs < 1:
-        raise ValueError(f"jobs: must be at least 1, got {jobs}")
+    check_integer("jobs", jobs, 1)
 
 
 def _remember(function: Function[Task, Result], task: Task, file: Path | None) -> Result:
