@@ -77,6 +77,17 @@ class Flight:
         moved = [Flight.fitted(t, x + mode, self.free).theta - self.theta for mode in modes]
         return np.reshape(moved, (-1, len(self.theta)))
 
+    def freed(self, t: Floats, x: Floats, modes: Floats, noise: float) -> Flight:
+        """The same, less what the errors that all samples share, (k, n, m), leave of samples.
+
+        Their sizes are the likeliest beside samples of some noise; of the scale, for one, any
+        motion would be an error, were it large enough.
+        """
+        bends = bent(self, t, modes, self.moved(t, x, modes)).reshape(len(modes), x.size)
+        likely = bends @ bends.T + noise**2 * np.eye(len(modes))
+        sizes = np.clip(np.linalg.solve(likely, bends @ self.left.ravel()), -3, 3)
+        return replace(self, left=self.left - (sizes @ bends).reshape(self.left.shape))
+
     @property
     def force(self) -> Floats:
         """The constant force, (m,)."""
@@ -98,6 +109,14 @@ def places(t: Floats, theta: Floats, slope: bool = False) -> Floats:
     near = np.abs(z) < 1e-4  # there the difference has lost its digits, and the series has not
     second = t**2 * np.where(near, 0.5 + z / 6, (exprel(z) - 1) / np.where(near, 1.0, z))
     return start + np.outer(first, velocity) + np.outer(second, force)
+
+
+def bent(flight: Flight, t: Floats, modes: Floats, moved: Floats) -> Floats:
+    """What of errors that all samples share no flight takes up that they move so, (k, n, m)."""
+    here = places(t, flight.theta)
+    each = zip(modes, moved, strict=True)
+    flown = [mode - (places(t, flight.theta + move) - here) for mode, move in each]
+    return np.reshape(flown, modes.shape)
 
 
 def coefficients_of(theta: Floats, exponents: Ints) -> Floats:
@@ -143,6 +162,7 @@ def homogeneous(
     m, middle = x.shape[1], (t[0] + t[-1]) / 2
     since, numbers = t - middle, np.arange(3 * m + 1)
     classes = [Flight.fitted(since, x, numbers < count) for count in (m, 2 * m, 3 * m, 3 * m + 1)]
+    modes = np.zeros((0, *x.shape)) if systematic is None else systematic
     noise = float(np.sqrt((smooth([(t, x)], np.random.default_rng(0)).noise ** 2).mean()))
     bounds = np.array([*(max(one.error, noise) for one in classes), noise])
     best = 1 + int(np.argmax(bounds[:-1] / bounds[1:]))
@@ -154,7 +174,6 @@ def homogeneous(
     # Mean products of what the numbers of the richer law are off those of this one.
     apart = richer.theta - flight.theta
     covariance = (richer.covariance + np.outer(apart, apart)) * np.outer(flight.free, flight.free)
-    modes = np.zeros((0, *x.shape)) if systematic is None else systematic
     # A scale, however wrong it is, makes no force of nothing: what is along the numbers themselves.
     moved, own = flight.moved(since, x, modes), flight.theta / np.linalg.norm(flight.theta)
     moved -= np.outer(moved @ own, own)
@@ -179,11 +198,19 @@ def homogeneous(
         for j in range(found.system.d)
     )
     exact = flight.error < CLEANEST * x.std()  # digits are what is left
-    doubts = () if exact else _doubt(flight, richer, penalty) or _bent(since, x, flight)
-    if (flight.free & ~kept & told(flight.covariance + shared)).any():
-        doubts = doubts or _doubt(law, flight, penalty)
-    doubts = *(doubts or _misfit(x, flight, noise)), *_outlying_ends(t, x)
-    return replace(found, warnings=doubts, path=path)
+    dropped = (flight.free & ~kept & told(flight.covariance + shared)).any()
+
+    def doubts(flight: Flight, richer: Flight, law: Flight) -> tuple[str, ...]:
+        said = () if exact else _doubt(flight, richer, penalty) or _bent(since, x, flight)
+        if dropped:
+            said = said or _doubt(law, flight, penalty)
+        return said or _misfit(x, flight, noise)
+
+    # What errors that all samples share may leave of them is no reason to doubt.
+    freed = (one.freed(since, x, modes, noise) for one in (flight, richer, law))
+    unsure = doubts(flight, richer, law) and doubts(*freed)
+    unsure = *unsure, *_outlying_ends(t, x, modes)
+    return replace(found, warnings=unsure, path=path)
 
 
 def _doubt(flight: Flight, richer: Flight, penalty: float) -> tuple[str, ...]:
@@ -236,7 +263,7 @@ def _misfit(x: Floats, flight: Flight, noise: float, most: float = 5.0) -> tuple
     )
 
 
-def _outlying_ends(t: Floats, x: Floats) -> tuple[str, ...]:
+def _outlying_ends(t: Floats, x: Floats, modes: Floats) -> tuple[str, ...]:
     """Places that are no part of the flight, with drag, which all but the two ends tell.
 
     A tenth of the places on either side is foretold from those between: a hand or the ground may
@@ -250,6 +277,8 @@ def _outlying_ends(t: Floats, x: Floats) -> tuple[str, ...]:
     sizes, axes = np.linalg.eigh(inner.covariance)
     told, moves = places(since, inner.theta), np.sqrt(np.maximum(sizes, 0.0)) * axes
     unsure = [places(since, inner.theta + one) - told for one in moves.T]
+    moved = inner.moved(since[out:-out], x[out:-out], modes[:, out:-out])
+    unsure += [*bent(inner, since, modes, moved)]
     spread = np.sqrt(inner.error**2 + np.square(unsure).sum(axis=0))
     strange = t[(np.abs(x - told) > GROSS * spread).any(axis=1)]
     if not len(strange):
