@@ -683,6 +683,6 @@ def _slack(problem: Problem) -> Floats:
     x, slope = collocation.node_states(fit_curves(collocation, problem.curves))
     terms = problem.terms(x)
     misfit = slope - terms @ np.linalg.lstsq(terms, slope, rcond=None)[0]
-    slack = np.maximum(np.sqrt((misfit**2).mean(axis=0)), 1e-4)
+    slack = np.maximum(np.sqrt((misfit**2).mean(axis=0)), 1e-3)
     searched = problem.form.candidates.any(axis=0)
     return np.where(searched, slack, slack[searched].min())
