@@ -436,6 +436,7 @@ def off(path, other):
     return np.abs((path - other) / clean.std(axis=0)).max()
 
 
+# %%
 inside, ends = bridged.curve(t[lost]), [last, lost.stop]
 before, after = (off(bridged.curve(t[[end]]), clean[end]) for end in ends)
 print(f"smooth across the gap: off by {off(smooth(t[lost]), clean[lost]):.2f} standard deviations; "
@@ -598,9 +599,6 @@ histories = {
 last = {name: h["physics loss"][-1] for name, h in histories.items()}
 assert last["Gauss-Newton"] < 1e-6 * last["spline-ADO"]
 
-terms = {f"all of degree {degree}": 3 * len(dynamics.monomial_exponents(3, degree)) for degree in (3, 2)}
-terms |= {"truth,\nreference frame": truth.support.sum(), "truth,\nown frame": native.support.sum()}
-
 # %% jupyter={"source_hidden": true} tags=["hide-input"]
 fig, panels = plt.subplots(3, 1, figsize=(7, 6), sharex=True)
 titles = {
@@ -612,6 +610,8 @@ for axes, (key, title) in zip(panels, titles.items(), strict=True):
         axes.plot(history["seconds"], history[key], style, ms=4, lw=1.2, label=name)
     axes.set(xscale="log", yscale="log", ylabel=title)
 panels[0].axhline(1, color="k", lw=0.8, ls=":")
+terms = {f"all of degree {degree}": 3 * len(dynamics.monomial_exponents(3, degree)) for degree in (3, 2)}
+terms |= {"truth,\nreference frame": truth.support.sum(), "truth,\nown frame": native.support.sum()}
 for text, number in terms.items():
     axes.axhline(number, color="k", lw=0.8, ls=":")
     beside = {"xy": (1.01, number), "xycoords": ("axes fraction", "data"), "fontsize": 9}
