@@ -226,12 +226,12 @@ d = np.linspace(-80, 80, 41)
 feet = np.array([foot(x[0], n, value) for value in d])
 assert np.allclose(feet @ n + d, 0, atol=1e-12)
 turned = {"R takes n to $e_z$": feet @ R.T, "as in the text: $e_z$ to n": feet @ text.T}
-spread = [np.ptp(values[:, :2], axis=0).max() for values in turned.values()]
-assert spread[0] < 1e-12
-assert spread[1] > 1
+moved = [np.ptp(values[:, :2], axis=0).max() for values in turned.values()]
+assert moved[0] < 1e-12
+assert moved[1] > 1
 rows = [
     {"rotation": "R takes n to e_z", "shift of the image": "below 1e-12"},
-    {"rotation": "as in the text: e_z to n", "shift of the image": f"{spread[1]:.1f}"},
+    {"rotation": "as in the text: e_z to n", "shift of the image": f"{moved[1]:.1f}"},
 ]
 caption = (
     "How far the image moves while the plane moves along its normal through all D (scene units)."
@@ -400,7 +400,7 @@ save_slider("projection_walk", figures, caption=caption, numbers={"degrees": lis
 # * A view plane is turned flat by the rotation that takes its **normal to** $\mathbf e_z$. Then
 #   the last row of R is the normal, the first two are the axes of the plane, and the position of the
 #   plane along its normal drops out because $\mathbf R\mathbf n\parallel\mathbf e_z$.
-#   <!-- by: np.allclose(R @ n, e_z; np.allclose(R[2], n; spread[0] < 1e-12 -->
+#   <!-- by: np.allclose(R @ n, e_z; np.allclose(R[2], n; moved[0] < 1e-12 -->
 #
 # **What the paper says and what we found.**
 #

@@ -86,35 +86,35 @@ differences = {}
 for name, system in SYSTEMS.items():
     t, x = system.trajectory(long)
     other = dynamics.runge_kutta_4(system, t, system.x0, substeps=10)
-    differences[name] = np.linalg.norm(other - x, axis=1) / x.std(axis=0).max()
+    differences[name] = np.linalg.norm(other - x, axis=1) / x.std(axis=0).max()  # of the widest coordinate
 periods = np.arange(long) / SAMPLES_PER_PERIOD
 worst = max(difference[periods <= 4].max() for difference in differences.values())
-print(f"largest distance in the first four periods: {worst:.1e} of the spread of the motion")
+print(f"largest distance in the first four periods: {worst:.1e} of the motion's standard deviation")
 assert worst < 1e-3
 
 # %% tags=["hide-input"] jupyter={"source_hidden": true}
 fig, axes = plt.subplots(figsize=(8, 4.2))
 for (name, difference), style in zip(differences.items(), plots.STYLES, strict=True):
     axes.semilogy(periods, np.maximum(difference, 1e-14), ls=style, label=name)
-axes.set(xlabel="time (characteristic periods)", ylabel="distance / spread of the motion")
+axes.set(xlabel="time (characteristic periods)", ylabel="distance / standard deviation of the motion")
 fig.legend(loc="outside right center")
 caption = "Runge-Kutta of order 4 against a tight solver: they agree until chaos takes over."
 save_figure("videos_runge_kutta", fig, caption=caption, numbers={"t": periods, **differences})
 
 # %% [markdown]
-# *Distance of the two solutions. A straight rise on this scale is chaos: a difference in the ninth
-# digit grows exponentially, in four of the systems until the two are a spread apart. Then they make different videos, and yet
+# *Distance of the two solutions, over the standard deviation of the coordinate that moves most. A straight rise on this scale is chaos: a difference in the ninth
+# digit grows exponentially, in four of the systems until the two are a standard deviation apart. Then they make different videos, and yet
 # each is a motion of the system to far better than a pixel.*
 #
-# Are all seven chaotic? From the paper's starts, a difference of $10^{-7}$ of the spread becomes this after 39 periods:
+# Are all seven chaotic? From the paper's starts, a difference of $10^{-7}$ standard deviations becomes this after 39 periods:
 
 # %%
 def growth(system):
     t, start = system.times(3901, 100), np.array(system.x0)
     one = system.simulate(t, start)
-    spread = one.std(axis=0).max()
-    other = system.simulate(t, start + 1e-7 * spread / np.sqrt(3))
-    return np.linalg.norm(other - one, axis=1).max() / spread
+    deviation = one.std(axis=0).max()
+    other = system.simulate(t, start + 1e-7 * deviation / np.sqrt(3))
+    return np.linalg.norm(other - one, axis=1).max() / deviation
 
 
 some = SYSTEMS if profile == "full" else ("Lorenz", "NoseHoover", "Tsucs2")
@@ -261,7 +261,7 @@ for path in (*again, lossy):
 # %% [markdown]
 # ## The tracker, step by step
 #
-# The paper tracks with YOLO-v8, a neural detector. A classical method does, too, and it is more exact. **First the background**: the median over frames spread through the clip. The target is
+# The paper tracks with YOLO-v8, a neural detector. A classical method does, too, and it is more exact. **First the background**: the median over frames from all parts of the clip. The target is
 # never long in one place, so that the median does not contain it.
 
 # %%
@@ -385,17 +385,16 @@ save_table("videos_tracker", rows, caption="The tracker against the known truth.
 # %% tags=["hide-input"] jupyter={"source_hidden": true}
 fig, axes = plt.subplots(figsize=(7.5, 4))
 for (name, error), style in zip(errors.items(), plots.STYLES, strict=False):
-    axes.ecdf(error[np.isfinite(error)], ls=style, label=name)
-axes.set(xscale="log", xlabel="distance from the truth (px)", ylabel="share of frames below")
-axes.legend(loc="upper left")
-caption = (
-    "Share of frames in which the tracked position is closer to the truth than a given distance."
-)
+    share, seen = (np.arange(len(error)) + 1) / len(error), np.isfinite(error).mean()
+    axes.step(np.sort(error), share, where="post", ls=style, label=f"{name}: seen in {seen:.0%}")
+axes.set(xscale="log", xlabel="distance from the truth (px)", ylabel="share of all frames", ylim=(0, 1.02))
+fig.legend(loc="outside upper center", ncols=2)
+caption = "Share of all frames in which the target is seen and closer to the truth than a given distance."
 save_figure("videos_tracker_errors", fig, caption=caption, numbers=errors)
 
 # %% [markdown]
-# *How often the tracked position is closer to the truth than a given distance: about a thousandth of
-# a pixel in clean videos, less than a tenth with noise. A post in the way costs frames; the others are
+# *In how many of all frames the target is seen and its position closer to the truth than a given distance: typically about a thousandth of
+# a pixel in clean videos, less than a tenth with noise. Where a curve ends is the share of frames in which the target is seen (legend): a post in the way costs frames; the others are
 # good to a tenth of a pixel, even where the target lingers at its edge.*
 
 # %%
@@ -427,12 +426,13 @@ assert np.median([np.sqrt(np.nanmean(error**2)) for error in drawn]) < 0.15
 # $$\mathbf c=\mathbf a+4\,\mathbf d .$$
 #
 # In training, $p$ is to become a bell $y$ around the target, which sinks as the target gets hidden, and
-# the anchors under the bell are to know the centroid $\mathbf c^*$:
+# the anchors well under the bell, where $y>0.2$, are to know the centroid $\mathbf c^*$:
 #
-# $$\mathcal L=\frac{\sum(y-p)^2\,H(y,p)}{\sum y}+\frac{\sum y\,\|\mathbf a+4\mathbf d-\mathbf c^*\|_1/4}{\sum y}
-# +\text{half of the same for the logarithm of the size},$$
+# $$\mathcal L=\frac{\sum(y-p)^2\,H(y,p)}{\sum y}+\frac{\sum w\,\bigl(\|\mathbf a+4\mathbf d-\mathbf c^*\|_1/4
+# +\tfrac12\|\log\mathbf s-\log\mathbf s^*\|_1\bigr)}{\sum w},\qquad w=\begin{cases}y&y>0.2\\0&\text{else.}\end{cases}$$
 #
-# with $H$ the cross entropy, which $(y-p)^2$ mutes where the network is right already. In use, the
+# Here $H$ is the cross entropy, which $(y-p)^2$ mutes where the network is right already, and $\mathbf s$ is the size, width and
+# height; offset and size count only where $w$ is not zero. All sums are over the anchors of all frames of a batch. In use, the
 # answers that agree are averaged: that is where the fractions of a pixel come from.
 
 # %%
@@ -552,7 +552,7 @@ save_figure("figure_S3", fig, caption=caption, numbers={"t": shot.t, "x": x, "tr
 # %% [markdown]
 # ## What we learned
 #
-# * The paper's integrator and a tight solver agree to a thousandth of the spread for four periods. By the end of the
+# * The paper's integrator and a tight solver agree to a thousandth of the motion's standard deviation for four periods. By the end of the
 #   videos chaos has separated them in four systems of seven; from these starts NoseHoover and Tsucs2 do not move chaotically.
 #   <!-- by: worst < 1e-3; apart == {; regular == {"NoseHoover", "Tsucs2"}; figure videos_runge_kutta -->
 # * "25 frames per second" needs a playback speed; 100 frames per period treat all systems alike.

@@ -365,7 +365,7 @@ save_figure("discovery_pulls", fig, caption=caption, numbers=pulled, tolerance=0
 
 # %% [markdown]
 # *Each point is one coefficient in the reference frame: its distance from the truth in standard
-# errors, all trials. Those of one trial stray together, since they share one path and one offset.*
+# errors, all trials (grey: up to two). Those of one trial stray together, since they share one path and one offset.*
 
 # %%
 def by_term(law):
@@ -400,9 +400,9 @@ print(len(rows), "terms, stored as table_S2")
 #
 # A law is more than its coefficients: let it run. We start each discovered law at the first point
 # of its curve and the truth at its initial condition. Where a motion is chaotic a small error grows
-# exponentially; a forecast counts as good until the distance exceeds a tenth of the spread of the
-# motion. A law should also hold where nobody filmed: so both start at other points, too, off the first one by a fifth of
-# the spread in each coordinate.
+# exponentially; a forecast counts as good until the distance exceeds a tenth of the motion's
+# standard deviation (of the coordinate that moves most). A law should also hold where nobody filmed: so both start at other points, too, off the first one by a fifth of
+# the standard deviation in each coordinate.
 
 # %%
 horizon = 40 if full else 10  # periods
@@ -493,7 +493,7 @@ save_figure("fig_2", fig, caption=caption, numbers=numbers)
 #
 # * The paper's errors are 0.15 to 6.22 (in $10^{-2}$) with four false positives in seven systems. From whole pixels the median of
 #   spline-ADO is below the paper's error in every system, with a false term in some trials, of Tsucs2 in most. Trials differ in
-#   nothing but their scenes, so their spread is that of the tracker.
+#   nothing but their scenes, so that what makes them differ is the tracker.
 #   <!-- by: (ado["l2 (e-2)"] < ado["paper: l2 (e-2)"]).all(); figure table_1 -->
 # * PySINDy's 824 % (NoseHoover) and 856 % (WangSun) are coefficients ten times too large
 #   throughout: a time step wrong by that factor. With the right step the medians are below 20 % here.

@@ -110,7 +110,7 @@ path_error = {
 # * **random blocks**: gaps of 1 % of the record each, as many as make up the rate;
 # * **fibers**: five gaps, as long as makes up the rate.
 #
-# A percentage of a spread says little about the lengths, so here they
+# A percentage of a standard deviation says little about the lengths, so here they
 # are.
 
 # %%
@@ -210,7 +210,7 @@ caption = "Misfit of held-out samples by the weights of spline-ADO, in percent o
 save_figure("study_weights", fig, caption=caption, numbers=numbers, tolerance=0.3)
 
 # %% [markdown]
-# *Misfit of the samples that were held out, in percent of the spread of the motion: geometric means over the systems. It hardly
+# *Misfit of the samples that were held out, in percent of the motion's standard deviation: geometric means over the systems. It hardly
 # tells the two smaller values of $\beta$ apart.*
 #
 # ## All methods, all systems
@@ -724,7 +724,7 @@ for row in rows:
 # * Table 2 contradicts itself at 20 % noise: one false positive with a precision of 100 % for one
 #   method, one with 80 % for the other.
 #   <!-- by: [row.false_positives for row in printed_20] == [1, 1]; [row.precision for row in printed_20] == [1, 0.8]; figure table_2 -->
-# * The paper does not say what noise levels are relative to; here it is the spread of each
+# * The paper does not say what noise levels are relative to; here it is the standard deviation of each
 #   coordinate. Nor does it say whether the occlusions come with noise; here they do not.
 #   <!-- by: np.allclose(noisy, add_noise(one.x, share; docs/results.md -->
 #

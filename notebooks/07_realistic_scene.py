@@ -285,7 +285,7 @@ print(
 )
 error = np.sqrt(np.nanmean((first.path - first.x) ** 2, axis=0))
 print(
-    f"rms error of the path: {error.round(4)} scene units, spread: {first.x.std(axis=0).round(2)}"
+    f"rms error of the path: {error.round(4)} scene units, standard deviation of the motion: {first.x.std(axis=0).round(2)}"
 )
 assert 0 < gap.mean() < np.mean(alone)
 assert (error < 0.01 * first.x.std(axis=0)).all()

@@ -509,7 +509,7 @@ caption = "Error in space by the model of the cameras; the vertical line is one 
 save_figure("lab_model_errors", fig, caption=caption, numbers=lengths)
 
 # %% [markdown]
-# *From centimetres to micrometres: the model of the camera first, then the fraction of a pixel, then the
+# *From centimetres to micrometres (vertical line: one millimetre): the model of the camera first, then the fraction of a pixel, then the
 # size of the ball.*
 
 # %% [markdown]

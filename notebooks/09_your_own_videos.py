@@ -328,8 +328,8 @@ save_figure("own_lags", fig, caption=caption, numbers={"lag": tried, "pixels": w
 
 
 # %% [markdown]
-# *Residual that one frame in ten exceeds, for each lag of the second video. The views agree at 7 frames
-# and nowhere else.*
+# *Residual that one frame in ten exceeds, for each lag of the second video. Above the dashed line the views are said to disagree: they agree
+# at 7 frames and nowhere else.*
 #
 # The search starts with pairs of cameras at all whole lags, goes on with all cameras at the best ones,
 # and ends with Gauss-Newton in the lags. Fractions are kept only if they explain the tracks better than
@@ -444,7 +444,7 @@ save_table("own_by_hand", rows, caption=caption, tolerance=loose)
 
 
 # %% [markdown]
-# With the errors in the file, a rig measured by hand gives the same path as the exact one, and the same coefficients, but for the
+# (Spread, in the table, is the standard deviation of the motion.) With the errors in the file, a rig measured by hand gives the same path as the exact one, and the same coefficients, but for the
 # unit of length, the origin and the axes. The axes are off by a degree or so, which by itself would look like small false
 # terms; as the file states the errors, `discover` allows for them. Where a tiny false term remains nevertheless, the verdict
 # is "suspect". Of the moves and stretches of the room that the hand leaves open, the law is given in the one in which it has

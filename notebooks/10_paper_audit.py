@@ -116,7 +116,8 @@ def rms(values):
 tracks = [camera.project(x) for camera in rig.cameras]
 wrong = reconstruct(tracks, as_text)
 missed, off = rms(np.hstack(residuals(tracks, as_text))), rms(wrong - x)
-print(f"residuals {missed:.0f} px, path off by {off:.1f} scene units (rms), spread {x.std():.1f}")
+size = rms(x - x.mean(axis=0))
+print(f"residuals {missed:.0f} px, path off by {off:.1f} scene units (rms); it moves by {size:.1f} (standard deviation)")
 try:
     learn_cameras(tracks, as_text.uncalibrated(keep=0))
 except ValueError as error:
@@ -141,8 +142,8 @@ assert rms(np.hstack(residuals(tracks, turned))) < 1e-6
 
 # %%
 paths = {
-    "truth": x, "the text's rotation, normals and positions as they are": wrong,
-    "the text's rotation throughout: half a turn": half_turn,
+    "truth": x, "cameras as they stand, rotation of the text": wrong,
+    "all measured with the rotation of the text": half_turn,
 }  # fmt: skip
 paths = {label: path[:400] for label, path in paths.items()}
 fig = plots.plot_in_plane({label: path[:, [0, 2]] for label, path in paths.items()}, "xz")
@@ -150,8 +151,8 @@ caption = "With the rotation of the text the path is lost, or turned by half a t
 save_figure("audit_rotation", fig, caption=caption, numbers=paths)
 
 # %% [markdown]
-# *The path from the side. With the rotation of the text and cameras as they stand (blue), the three views
-# do not meet in one point; with everything measured by that rule (vermilion), the world is turned about z.*
+# *The path from the side. With cameras as they stand and the rotation of the text (blue), the three views
+# do not meet in one point, and the path lands elsewhere; with everything measured by that rotation (vermilion), the world is turned about z.*
 #
 # The same holds for the independence of D: the coefficient of D in $x_{rp}, y_{rp}$ is
 # $-\mathbf R^-\mathbf n$, which is zero only for *normal to* $\mathbf e_z$. The matrix of the proof,
@@ -170,7 +171,7 @@ assert abs(of_d["proof"][0]) < 1e-12 < 0.1 < abs(of_d["proof"][1])
 assert np.linalg.det(proof) < 0.99
 
 note("Sec. 3.1, App. A", "v1 = R v0: R takes e_z to the normal", "x_rp = R x_p needs the inverse",
-     f"residual of {missed:.0f} px, path off by {off:.0f} scene units (spread {x.std():.0f})",
+     f"residual of {missed:.0f} px, path off by {off:.0f} scene units (standard deviation of the motion: {size:.0f})",
      "no, if data and reconstruction share it; yes for real cameras")
 note("Eq. (S4)", "row 2, column 3 is +u_x sin", "-u_x sin, as in Eq. (S2)",
      f"det {np.linalg.det(proof):.3f}; y_rp changes by {-of_d['proof'][1]:.2f} D",

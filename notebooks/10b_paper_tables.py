@@ -182,7 +182,7 @@ assert differences["NoseHoover, PySINDy"] < 1.5  # 824.44 beside 824.47
 # %% [markdown]
 # The scores are said to be averages over five trials. That ten of fourteen are, within the
 # rounding of its coefficients, the score of *one* printed law leaves two readings: they are the scores of one trial, or the trials hardly
-# differed. No spread is given; for clean videos the second is well possible.
+# differed. No standard deviation is given; for clean videos the second is well possible.
 
 # %%
 note("Table S2", "WangSun, PySINDy: +82.27y", "82.27z",
@@ -194,7 +194,7 @@ note("Table 1", "l2 of SprottF (own method), Tsucs2 (PySINDy)", "not those of Ta
      f"{tsucs['l2 recomputed (e-2)']:.2f} for {tsucs['l2 printed (e-2)']:.2f}", "hardly")
 note("Sec. 4.1", "results are averaged over five trials",
      "most errors are, within rounding, those of one printed law",
-     f"{agree} of {len(rows)} rows", "no spread is known")  # fmt: skip
+     f"{agree} of {len(rows)} rows", "no standard deviation is known")  # fmt: skip
 
 # %% [markdown]
 # ## Rows that exclude themselves
@@ -573,14 +573,14 @@ save_figure("audit_nose_hoover_path", fig, caption=caption, numbers=paths)
 # %%
 truth, implied = paths.values()
 away = np.linalg.norm(implied - truth) / np.linalg.norm(truth - truth.mean(axis=0))
-print(f"distance of the two, over the spread: {away:.2f}")
+print(f"distance of the two, over the standard deviation of the motion (rms): {away:.2f}")
 assert away > 0.3
 note("Table 1, S2", "NoseHoover, own method: 6.22", "the true law, in coordinates of its own",
      f"stretch of y {fit.scale[1]:.3f}, of z {fit.scale[2]:.3f}, y from {fit.offset[1]:.2f}; "
      f"l2 left: {100 * fit.misfit:.3f}",
      "in the authors' favour: cameras, not regression")
 note("Fig. 2", "discovered and true paths nearly coincide", "not for NoseHoover's printed law",
-     f"{away:.0%} of the spread apart",
+     f"{away:.0%} of the standard deviation apart",
      "unless the reconstructed path is shown as true")  # fmt: skip
 
 # %% [markdown]

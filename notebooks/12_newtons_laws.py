@@ -188,7 +188,8 @@ print(f"apart by at most {100 * apart:.2f} % of the motion")
 assert apart < (0.01 if full else 0.05)
 
 # %%
-fig = plots.plot_path(later, {"true motion": true, "foretold by the law": told})
+both = {"true motion": true, "foretold by the law": told}
+fig = plots.plot_path(later, both, unit="s", length="cm")
 caption = "Another motion of the ball: the true path (grey) and what the discovered law foretells."
 save_figure("newton_forecast", fig, caption=caption, numbers={"true": true, "told": told})
 

@@ -256,7 +256,7 @@ fig, axes = plt.subplots(figsize=(7, 3))
 axes.plot(s, pendular.tracks[0][:, 0], "o", ms=3, color="0.6", label="filmed")
 axes.plot(s[seen - 1 :], foretold[:, 0], label="foretold")
 axes.axvline(s[seen - 1], color="0.3", lw=1)
-axes.set(xlabel="t (s)", ylabel="u (px)")
+axes.set(xlabel="time (s)", ylabel="u (px)")
 axes.legend(ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1))
 caption = "Across the picture: the ball as filmed (dots), and from the line on what the law of the first half foretells."
 numbers = {"t": s, "filmed": pendular.tracks[0][:, 0], "foretold": foretold[:, 0]}

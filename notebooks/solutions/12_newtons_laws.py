@@ -92,7 +92,7 @@ print("right")
 
 # %% [markdown]
 # **4.** (Explore.) Let a pendulum, $\ddot x=-9.81\sin x-0.1\,\dot x$, hang in a wind that pushes with $0.5\cos x$.
-# Simulate it for 20 s at 60 samples a second from 1.5 rad and from 0.1 rad, add noise of 1 % of the spread, and
+# Simulate it for 20 s at 60 samples a second from 1.5 rad and from 0.1 rad, add noise of 1 % of the standard deviation, and
 # discover with `library=sines, order=2`. Put the laws into a dictionary `laws_of`, by the angle. Is the push found
 # beside the sine?
 

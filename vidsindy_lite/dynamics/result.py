@@ -425,7 +425,7 @@ class Discovery:
             axes.stairs(counts, edges, color="0.4", baseline=None, label="all laws")
             for own in (p for p in self.path[j] if (p.terms == self.native.support[:, j]).all()):
                 axes.hlines(own.terms.sum(), own.low, own.high, color="C1", lw=5, label="the law")
-            axes.set(xscale="log", xlabel="tolerated error / spread", title=side)
+            axes.set(xscale="log", xlabel="tolerated error\n/ standard deviation", title=side)
             axes.yaxis.set_major_locator(MaxNLocator(integer=True))
         panels[0, 0].set(ylabel="terms", ylim=(0, None))
         drawn = [axes.get_legend_handles_labels() for axes in panels[0]]

@@ -233,14 +233,18 @@ def _show(axes: Axes, image: Image) -> None:
 
 
 def _magnify(axes: Axes, image: Image, track: Floats, index: int) -> None:
-    """The surroundings of the target, three times as large, in the corner with the least track."""
+    """The surroundings of the target, three times as large, where the least track is."""
     reach = 3 / 64 * image.shape[1]  # 24 px of 512
-    corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])  # right, bottom
     size = np.array(image.shape[1::-1])
     part = 6 * reach / size
     seen = track[np.isfinite(track).all(axis=1)] / size
-    inside = [np.all(np.abs(seen - corner) < 1.1 * part, axis=1).sum() for corner in corners]
-    right, bottom = corners[int(np.argmin(inside))]
+    # Corners first, so that one of them is taken if the track leaves it free.
+    steps = np.linspace(0, 1, 9)
+    places = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)  # right, bottom
+    places = places[np.argsort(-np.abs(places - 0.5).sum(axis=1), kind="stable")]
+    middles = places * (1 - part) + part / 2
+    inside = [np.all(np.abs(seen - middle) < 0.6 * part, axis=1).sum() for middle in middles]
+    right, bottom = places[int(np.argmin(inside))]
     place = (right * (1 - part[0]), (1 - bottom) * (1 - part[1]), *part)
     u, v = track[index]
     near: dict[str, Any] = {"xlim": (u - reach, u + reach), "ylim": (v + reach, v - reach)}
@@ -265,13 +269,13 @@ def plot_in_plane(curves: Mapping[str, Floats], names: Sequence[str]) -> Figure:
         Names of the two coordinates: to the right and upwards.
     """
     tall = np.ptp(np.vstack(list(curves.values())), axis=0) @ (-1, 1) > 0
-    figure, axes = plt.subplots(figsize=(8, 4.2) if tall else (7, 4.8))
+    figure, axes = plt.subplots(figsize=(5, 6.8) if tall else (7, 4.8))
     for index, (label, curve) in enumerate(curves.items()):
         style = {"lw": 1.2, "color": f"C{index - 1}"} if index else {"lw": 5, "color": "0.8"}
         axes.plot(*curve.T, label=label, **style)
     right, up = (f"{name} (scene units)" for name in names)
     axes.set(xlabel=right, ylabel=up, aspect="equal")
-    figure.legend(loc="outside right center" if tall else "outside upper center")
+    figure.legend(loc="outside upper center")
     return figure
 
 
@@ -281,6 +285,7 @@ def plot_path(
     missing: str = "",
     styles: Sequence[Mapping[str, Any]] = LINES,
     unit: str = "units of the equations",
+    length: str = "scene units",
 ) -> Figure:
     """Draw curves over time, coordinate by coordinate, and in space.
 
@@ -288,13 +293,13 @@ def plot_path(
     ----------
     t : ndarray, shape (n,)
     curves : dict of str to ndarray, shape (n, 3) or (n, 2)
-        Positions by what they are: scene units; NaN where there is none.
+        Positions by what they are; NaN where there is none.
     missing : str
         What the times are called, which are shaded, at which a curve is NaN.
     styles : sequence of dict
         Of the lines, in this order.
-    unit : str
-        Of the times.
+    unit, length : str
+        Units of the times and of the positions.
     """
     figure = plt.figure(figsize=(10.5, 4.7))
     names = "xyz"[: next(iter(curves.values())).shape[1]]
@@ -313,13 +318,13 @@ def plot_path(
             axes.plot(t, curve[:, i], **style)
         axes.set_ylabel(name)
         axes.label_outer()
-    panels[names[-1]].set_xlabel(f"time ({unit}); {', '.join(names)} in scene units")
+    panels[names[-1]].set_xlabel(f"time ({unit}); {', '.join(names)} in {length}")
     for (label, curve), style in zip(curves.items(), styles, strict=True):
         space.plot(*curve.T, label=label, **style)
     if missing:
         space.plot([], [], color="0.85", lw=8, label=missing)
     if len(names) == 3:
-        finish_space(space, azimuth=-60, elevation=25, zoom=0.85)
+        finish_space(space, azimuth=-60, elevation=25, zoom=0.85, unit=length)
     figure.legend(*space.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
 
