@@ -43,7 +43,7 @@ from .candidates import (
 )
 from .plate import Plate, carry, lights_of, noise_of, sampled
 from .refining import Lens, View, entire, fitting, roughness, swapped
-from .video import Reel, reduce
+from .video import Reel, frame_clock, reduce
 
 _SHORTEST = 5  # frames of a path
 _LOOKS_ALONE = "no view tells it from its ground: it is followed by its looks alone"
@@ -188,7 +188,7 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
     if hint is not None and hint.colour is not None and any(views):
         colour = np.median([view.colour for view in views if view], axis=0)
         doubts += hint.unlike(colour)
-    found, bound = finished(views, film.motion, doubts)
+    found, bound = finished(views, film.motion, doubts, frame_clock(path))
     found = _filled(found, bound, film, ways, both.frame[rows], seed)
     found = replace(found, warnings=found.warnings + unsure(found))
     if seed is not None and found.warnings and not _shown(seen, seed).any():
@@ -439,10 +439,17 @@ def expected(seen: Candidates, rows: Ints, film: Film, n: int) -> Ways:
 
 
 def finished(
-    views: list[View | None], motion: CameraMotion, doubts: tuple[str, ...]
+    views: list[View | None],
+    motion: CameraMotion,
+    doubts: tuple[str, ...],
+    clock: Floats | None = None,
 ) -> tuple[Track, float]:
-    """The views of the whole target as a track, and by how many pixels they may be off at most."""
+    """The views of the whole target as a track, and by how many pixels they may be off at most.
+
+    By default the frames are evenly spaced; see `frame_clock`.
+    """
     n = len(views)
+    clock = np.arange(n, dtype=float) if clock is None or len(clock) < n else clock
     pixels, errors = np.full((n, 2), np.nan), np.full(n, np.inf)
     whole, of_parts = entire(views)
     at = np.array([i for i, view in enumerate(whole) if view], int)
@@ -454,7 +461,7 @@ def finished(
     areas = np.array([view.area for view in shown])
     inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])
     skewness = np.array([view.skewness for view in shown])
-    good, bound = fitting(at, steady, areas, skewness, inside)
+    good, bound = fitting(clock[at], steady, areas, skewness, inside)
     untold = at[~np.isfinite(motion.errors[at])]
     if len(untold):
         doubts += (f"in {len(untold)} frames of {n} the target is seen, but not how the camera "
@@ -465,7 +472,7 @@ def finished(
         doubts += (f"from frame {at[good][first]} on, what is followed has another size at once: "
                    "perhaps it is something else",)  # fmt: skip
     pixels[at[good]] = steady[good]
-    rough, torn = roughness(at[good], steady[good], areas[good])
+    rough, torn = roughness(clock[at][good], steady[good], areas[good])
     errors[at[good]] = np.hypot(rough, motion.errors[at[good]])
     side = np.sqrt(np.median(areas[good]))
     if bound > side / 3:  # of half of it the outline is off by that
@@ -556,10 +563,11 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
         doubts = (f"{Path(path).name}: one thing more moves than there are targets, "
                   f"{_example(film, seen, plain[count])}",)  # fmt: skip
     lens = lens_of(film, *ways)
-    tracks = []
+    tracks, clock = [], frame_clock(path)
     for way, met in zip(ways, touching, strict=True):
         way.centre[met] = np.nan
-        tracks.append(finished(viewed(film, lens, way, lights), film.motion, doubts)[0])
+        views = viewed(film, lens, way, lights)
+        tracks.append(finished(views, film.motion, doubts, clock)[0])
         doubts = ()
     return (*tracks, *[nothing(film.motion, n, film.doubts)] * (count - len(tracks)))
 

@@ -201,7 +201,7 @@ def entire(views: Sequence[View | None]) -> tuple[list[View | None], tuple[str, 
 
 
 def displaced(
-    frames: Ints, places: Floats, areas: Floats, skewness: Floats, inside: Bools
+    frames: Floats, places: Floats, areas: Floats, skewness: Floats, inside: Bools
 ) -> tuple[Floats, float]:
     """Pixels by which views (n,) are off the target, as their outlines say, and a bound to them.
 
@@ -228,7 +228,7 @@ def displaced(
     return off, bound()
 
 
-def _trend(frames: Ints, at: Ints, values: Floats) -> Floats:
+def _trend(frames: Floats, at: Floats, values: Floats) -> Floats:
     """What the values around each frame say of it: the line of Theil and Sen through nine."""
     first = np.clip(np.searchsorted(at, frames) - _AROUND // 2, 0, len(at) - _AROUND)
     around = first[:, None] + np.arange(_AROUND)
@@ -239,7 +239,7 @@ def _trend(frames: Ints, at: Ints, values: Floats) -> Floats:
 
 
 def fitting(
-    frames: Ints, places: Floats, areas: Floats, skewness: Floats, inside: Bools
+    frames: Floats, places: Floats, areas: Floats, skewness: Floats, inside: Bools
 ) -> tuple[Bools, float]:
     """Which views (n,) are of the whole target, on its way; by so many pixels they may be off."""
     off, bound = displaced(frames, places, areas, skewness, inside)
@@ -272,7 +272,7 @@ def swapped(frames: Ints, areas: Floats) -> int | None:
     return None
 
 
-def _left_out(frames: Ints, places: Floats) -> tuple[Floats, Floats]:
+def _left_out(frames: Floats, places: Floats) -> tuple[Floats, Floats]:
     """How far places are from where the three on both sides say, and how unsure that is: (m,) each.
 
     Of five or more. A quartic through six says it. Where a target turns within a few frames, or
@@ -282,7 +282,7 @@ def _left_out(frames: Ints, places: Floats) -> tuple[Floats, Floats]:
     own = np.arange(m)[:, None]
     beside = np.clip(own - 3, 0, m - 1 - count) + np.arange(count)
     beside += beside >= own  # without itself
-    t = (frames[beside] - frames[:, None]).astype(float)
+    t = frames[beside] - frames[:, None]
     quartic, parabola = (
         np.einsum("ij,ijk->ik", np.linalg.pinv(t[..., None] ** np.arange(degree + 1))[:, 0],
                   places[beside])
@@ -295,7 +295,7 @@ def _left_out(frames: Ints, places: Floats) -> tuple[Floats, Floats]:
     return np.where(far, 0.0, off), np.where(far, np.inf, unsure)
 
 
-def roughness(frames: Ints, places: Floats, areas: Floats) -> tuple[Floats, float]:
+def roughness(frames: Floats, places: Floats, areas: Floats) -> tuple[Floats, float]:
     """How far each of the views (n,) may be off its place, and how far as a rule by its outline.
 
     By as much as the way is rough, or as it is off the way of those around it. And what is missing
@@ -309,13 +309,16 @@ def roughness(frames: Ints, places: Floats, areas: Floats) -> tuple[Floats, floa
     return np.hypot(scatter(frames, places), worst), torn
 
 
-def scatter(frames: Ints, places: Floats) -> float:
+def scatter(frames: Floats, places: Floats) -> float:
     """Standard error of the places (n, 2) of a smooth motion, per axis: how rough they are."""
-    runs = np.flatnonzero(frames[4:] - frames[:-4] == 4)
+    runs = np.flatnonzero(frames[4:] - frames[:-4] < 4.5)
     if len(runs) < 3:
         return float("inf")
-    fourth = sum(c * places[runs + k] for k, c in enumerate((1, -4, 6, -4, 1)))
-    return float(1.4826 * np.median(np.abs(fourth)) / np.sqrt(70))
+    five = runs[:, None] + np.arange(5)
+    apart = frames[five][:, :, None] - frames[five][:, None]
+    fourth = 1 / (apart + np.eye(5)).prod(axis=2)  # divided differences
+    fourth /= np.linalg.norm(fourth, axis=1, keepdims=True)
+    return float(1.4826 * np.median(np.abs(np.einsum("nk,nkd->nd", fourth, places[five]))))
 
 
 def whole(
