@@ -212,12 +212,15 @@ def test_a_spring_on_a_line_has_a_period(monkeypatch, order):
     assert abs(said["damping"].value - 2 * 0.1) < 3 * said["damping"].error < 0.03
 
 
-def test_what_a_slope_bears_has_no_g(monkeypatch):
+def test_what_a_slope_bears_has_no_g(monkeypatch, tmp_path):
     rolled = 1.5 * np.outer(np.arange(30) / 30, (1, 1)) ** 2 @ [[0.8, 0], [0, -0.6]]
     filmed(monkeypatch, pixels_of(noisy(rolled, 0)))
     found = vl.discover_from_video("slope.mp4", STICK)
     assert (found.status, found.g) == ("ok", None)
-    assert ("pull = " in str(found), " g = " in str(found)) == (True, False)
+    found.discovery.save(tmp_path / "slope.json")
+    for told in (found, vl.Discovery.load(tmp_path / "slope.json").physics()):
+        assert ("pull = " in str(told), "g = " in str(told)) == (True, False)
+    assert str(told).endswith("what bears it may rub: no energy")
     assert max(len(repr(one)) for one in (found, found.discovery)) < 60
     assert "53 degrees off the vertical: something bears it" in found.rig.note
     for start in ((0, 1), (1.2, 4)):  # in whole pixels: straight down, and 10 a frame

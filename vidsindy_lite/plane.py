@@ -7,7 +7,6 @@ one before it, the simplest is taken that the data bear: forces that are the sam
 """
 
 import os
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,7 +18,6 @@ import numpy as np
 from .arrays import Floats
 from .cameras import Lags, OrthographicCamera, Rig
 from .checks import check_array, check_number, check_path, check_positive, check_vector, shown
-from .dynamics import Quantity
 from .pipeline import (
     Observation,
     VideoDiscovery,
@@ -90,15 +88,6 @@ class PlaneDiscovery(VideoDiscovery):
         axes = directions(self.t[there], self.x[there, :2])
         off = float(np.arctan2(*np.abs(axes[0])))
         return float(np.rad2deg(off)) if len(axes) == 1 and off > SURE * HELD else 0.0
-
-    @property
-    def g(self) -> Quantity | None:
-        """As of any motion; None of what leans, since a slope or a table bears it."""
-        return None if self.leaning else super().g
-
-    def __str__(self) -> str:
-        said = super().__str__()
-        return re.sub(r"\bg = ", "pull = ", said) if self.leaning else said
 
 
 def discover_from_video(
@@ -219,7 +208,8 @@ def discover_from_video(
         borne = (
             f"{found.leaning:.0f} degrees off the vertical: something bears it, its pull is no g"
         )
-        found = replace(found, rig=noted(rig, f"along a line {borne}"))
+        law = replace(found.discovery, force="pull")
+        found = replace(found, rig=noted(rig, f"along a line {borne}"), discovery=law)
     contradicted = _contradicted(found, up is not None or corners is not None, corners is None)
     if found.warnings != seen.warnings and frames is None:
         contradicted.append(

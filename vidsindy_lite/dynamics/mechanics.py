@@ -99,7 +99,7 @@ class Physics:
     @property
     def headline(self) -> str:
         """In one line what is not read off the equations: gravity and drag, or periods."""
-        named = ("g", "direction", "drag", "quadratic drag")
+        named = ("g", "pull", "direction", "drag", "quadratic drag")
         said = [str(q) for q in self if q.name.startswith(named)]
         if periods := [str(q) for q in self if q.name.startswith("period")]:
             supposed = f" ({IMITATED})" if any(IMITATED in note for note in self.notes) else ""
@@ -115,6 +115,7 @@ def physics_of(
     covariance: Floats,
     curves: Sequence[BSpline],
     down: ArrayLike | None = None,
+    force: str = "g",
 ) -> Physics:
     """What a law says of a body.
 
@@ -127,6 +128,8 @@ def physics_of(
         The motion, velocities included.
     down : array_like, shape (m,), optional
         Direction of gravity.
+    force : str
+        What a constant force is called, see `Discovery`.
 
     Raises
     ------
@@ -140,17 +143,18 @@ def physics_of(
         down = down / np.linalg.norm(down)
     if law.order == 1:
         return Physics((), (), ("a law of first order holds no forces: order=2 looks for them",))
-    driven = ""
+    unsaid = ""
     if law.timed:
         whole = law.support.sum()
         law, covariance = _without_time(law, covariance)
         if law.support.sum() < whole - 1:  # the time itself has a term, too
-            driven = "a force changes with the time: what is said holds without it; no energy"
+            unsaid = "a force changes with the time: what is said holds without it; no energy"
     times = [np.linspace(curve.t[0], curve.t[-1], POINTS) for curve in curves]
     paths = [curve(t)[:, : law.d] for curve, t in zip(curves, times, strict=True)]
     body = _Body(law, covariance, times, paths)
     if not body.force(law, body.states)[1].any():
-        said = list(body.flight(down))
+        said = list(body.flight(down, force))
+        unsaid = unsaid or ("" if force == "g" else "what bears it may rub: no energy")
     elif body.rest is not None:
         said = list(body.swing(body.rest))
     else:
@@ -158,12 +162,12 @@ def physics_of(
             "nothing holds it at a place near the motion, or a force jumps there: no spring "
             "constants and no periods"
         ]
-    energy = [] if driven else body.energies(law)
+    energy = [] if unsaid else body.energies(law)
     change = body.balance() if energy else "the forces have no potential: no energy"
     return Physics(
         quantities=tuple(entry for entry in said if isinstance(entry, Quantity)),
         energy=tuple(energy),
-        notes=(*(entry for entry in said if isinstance(entry, str)), driven or change),
+        notes=(*(entry for entry in said if isinstance(entry, str)), unsaid or change),
     )
 
 
@@ -271,7 +275,7 @@ class _Body:
             found[name] = value[name], slope.T @ covariance @ slope
         return found
 
-    def flight(self, down: Floats | None) -> Iterator[Quantity | str]:
+    def flight(self, down: Floats | None, name: str) -> Iterator[Quantity | str]:
         """Gravity and drag of a body on which the same forces act everywhere."""
         place = self.states[:, : self.m].mean(axis=0)
         pull, _, slowed = self.at_rest(self.law, place)
@@ -288,7 +292,7 @@ class _Body:
         if not pull.any():
             yield "no constant force: no g"
         else:
-            yield Quantity.of("constant torque" if turns else "g", *said["g"])
+            yield Quantity.of("constant torque" if turns else name, *said["g"])
             if down is None:
                 yield Quantity.of("direction", *said["direction"])
         if not _diagonal(slowed):

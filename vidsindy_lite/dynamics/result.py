@@ -253,6 +253,8 @@ class Discovery:
         ``swing.circle``, and the law of the angle on it, ``swing.law``. None elsewhere.
     across : tuple of scipy.interpolate.BSpline
         Curves across the gaps between stretches in which the law leads from one side to the other.
+    force : str
+        What `physics` calls a constant force: ``"g"``, or ``"pull"`` of what something bears.
     """
 
     system: PolynomialSystem
@@ -272,6 +274,7 @@ class Discovery:
     orientation: Floats | None = None
     swing: Swing | None = None
     across: tuple[BSpline, ...] = ()
+    force: str = "g"
 
     @property
     def status(self) -> str:
@@ -401,7 +404,7 @@ class Discovery:
         """
         if self.swing is not None:
             return self.swing.law.physics()
-        return physics_of(self.system, self.covariance, self.curves, down)
+        return physics_of(self.system, self.covariance, self.curves, down, self.force)
 
     def plot_path(self) -> Figure:
         """Draw `path`: the terms of each equation over the error that is tolerated.
