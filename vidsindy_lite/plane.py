@@ -213,9 +213,10 @@ def discover_from_video(
     contradicted = _contradicted(found, up is not None or corners is not None, corners is None)
     if found.warnings != seen.warnings and frames is None:
         contradicted.append(
-            "frames: all were taken to be of one motion: if it begins in a hand or ends on the "
-            "ground, give the first and the last frame that count; and before a plain wall, which "
-            "does not show how a hand trembles, the phone has to stand on something"
+            f"frames: all{' after its rest' if held else ''} were taken to be of one motion: if it "
+            "begins in a hand or ends on the ground, give the first and the last frame that count; "
+            "and before a plain wall, which does not show how a hand trembles, the phone has to "
+            "stand on something"
         )
     law = replace(found.discovery, warnings=(*found.warnings, *contradicted))
     return replace(found, warnings=law.warnings, discovery=law)

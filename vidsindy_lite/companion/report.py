@@ -19,6 +19,7 @@ import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from string import ascii_lowercase
@@ -35,6 +36,7 @@ from ..cameras import DISAGREEMENT, Rig, stacked
 from ..checks import check_instance, check_path
 from ..dynamics import Discovery, Swing
 from ..pipeline import Refused, Stopped, VideoDiscovery
+from ..plane import PlaneDiscovery
 from ..progress import bar
 from ..storage import write_file, write_files
 from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
@@ -335,7 +337,10 @@ def _figures(found: VideoDiscovery, paths: Videos) -> Iterator[tuple[str, bytes]
     d = 3 if np.nan_to_num(x)[:, 2].any() else 2  # in the plane of one camera
     curves = {"reconstructed": x[:, :d]}
     curves["curve that obeys the law"] = stacked(found.fitted, 3)[:, :d]
-    yield "path", _picture(plot_path, t, curves, "not seen")
+    draw = plot_path
+    if isinstance(found, PlaneDiscovery):
+        draw = partial(plot_path, unit="s", length=found.unit)
+    yield "path", _picture(draw, t, curves, "not seen")
     seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
     if seen.any() and paths is not None:
         instant = int(seen.argmax())

@@ -325,6 +325,8 @@ def plot_path(
         space.plot([], [], color="0.85", lw=8, label=missing)
     if len(names) == 3:
         finish_space(space, azimuth=-60, elevation=25, zoom=0.85, unit=length)
+    else:
+        space.set(xlabel=f"x ({length})", ylabel=f"y ({length})")
     figure.legend(*space.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
 
