@@ -318,7 +318,9 @@ def test_a_table_of_the_track_and_the_frames_that_count(tmp_path, capsys):
     table, law = tmp_path / "throw.csv", tmp_path / "law"
     np.savetxt(table, rows, "%.4f", ",", header="frame,u,v", comments="")
     found = vl.discover_from_video(table, STICK, fps=30)
-    assert found.warnings[-1].startswith("frames: all were taken to be of one motion")
+    assert found.warnings[-1].startswith(
+        "frames: all after its rest were taken to be of one motion"
+    )
     given = ["--length", ",".join(map(str, STICK))]
     command = ["discover", "--tracks", str(table), "--fps", "30", *given, "--out", str(law)]
     assert main([*command, "--frames", "124,157"]) == 0
