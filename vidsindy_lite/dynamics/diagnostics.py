@@ -22,7 +22,7 @@ from ..arrays import Bools, Floats, Ints
 from .collocation import CLEANEST, Fit, Linearisation, State, Status, WithCurve
 from .data import Trajectory, typical_step
 from .frames import closed, free_offsets, laws_at
-from .l0 import RIDGE, STRONG, far_neighbours, newcomers, prior_penalties
+from .l0 import RIDGE, STRONG, far_neighbours, newcomers, prior_penalties, subset_search
 from .library import monomial_exponents, monomials, shift_generators, shift_matrix
 from .mechanics import FAINT, Round, on_circle, on_sphere
 from .model import PolynomialSystem, place, spoken
@@ -451,6 +451,7 @@ def diagnose(
         *_unmet(fit, remedy),
         *_contested(problem, fit.state, path, remedy),
         *_rivals(problem, fit, model, wider, path, law, remedy, clean),
+        *_late(problem, fit, law),
         *_sampling(problem, fit, law, remedy),
     )
 
@@ -688,6 +689,43 @@ def _changing(problem: Problem, fit: Fit, tolerated: float, most: int = 8) -> It
         yield (
             f"{where} has other coefficients than the rest (chi-square {gain:.4g} of {len(own)}): "
             "something that is not in the law differs or changes"
+        )
+
+
+def _late(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
+    """Would the law be sparser if one coordinate was measured later or earlier than all others?
+
+    What is late obeys a law, too, in which combinations of the state and its slope, more terms,
+    stand in place of a coordinate. As of two origins, that of the sparser law is the likelier one.
+    """
+    state, collocation = fit.state, fit.collocation
+    seen = np.flatnonzero(collocation.counts[: problem.measured[0][1].shape[1]]).tolist()
+    if problem.has_process_noise or len(seen) < 2:
+        return
+    each = zip(fit.splines, collocation.segments, strict=True)
+    step = typical_step(problem.trajectories) * np.concatenate([c(s.t, 1) for c, s in each])
+    columns = problem.columns(state)
+    costs, present = problem.costs(columns), state.flat()[columns]
+    support, priced = state.free()[columns], np.isfinite(costs)
+    own, found = collocation.objective(state) + costs[support & priced].sum(), []
+    for j in seen:
+        later = (step * (np.arange(problem.d) == j))[..., None]
+        shared = np.concatenate([collocation.systematic, later], axis=2)
+        beside = replace(collocation, systematic=shared)
+        model = beside.linearise(state, columns)
+        start = model.information, model.gradient, present, costs, support
+        terms, solution, value = subset_search(*start)
+        fewer = int((support & priced).sum() - (terms & priced).sum())
+        gain = own - (beside.objective(state) - model.fall + value)
+        sizes = model.sizes + model.shared @ np.append(1.0, solution - present)
+        if fewer > 0 and gain > STRONG:
+            found.append((gain, fewer, law.names[j], -float(sizes[-1])))
+    if found:
+        gain, fewer, name, size = max(found)
+        terms, when = "terms" if fewer > 1 else "term", "later" if size > 0 else "earlier"
+        yield (
+            f"the law has {fewer} {terms} less if {name} was measured {abs(size):.2g} of a step "
+            f"{when} than its times say (criterion {-gain:+.4g}): correct it, or give systematic="
         )
 
 
