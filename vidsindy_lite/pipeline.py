@@ -902,9 +902,7 @@ def times_of(
     return [np.arange(len(track.pixels)) / given for track in read], doubts
 
 
-def with_law(
-    seen: Observation, names: Sequence[str], law: dict[str, Any], straight: int | None = None
-) -> VideoDiscovery:
+def with_law(seen: Observation, names: Sequence[str], law: dict[str, Any]) -> VideoDiscovery:
     """An observation with the law that it obeys, given what else `discover` takes.
 
     In a frame that is any affine map of space, the default is a law that is linear in any other.
@@ -916,9 +914,6 @@ def with_law(
         What messages call the tracks.
     law : dict
         See `law_options`.
-    straight : int, optional
-        How many of the systematic errors, the first ones, do not bend the paths of linear forces:
-        laws are told from each other with these alone. By default all.
     """
     default = all(law[name] in (None, "auto") for name in ("degree", "library", "order"))
     if default and isinstance(seen.rig.cameras[0], cameras.AffineCamera):
@@ -933,13 +928,12 @@ def with_law(
         share = (left @ left) / max(len(left), 1) / np.nanvar(pixels, axis=0).mean()
         apart = float(np.sqrt(share))
         x, modes, circle = seen.x[:, moves], seen.systematic[..., moves], None
-        told = modes[:straight]
         if default and seen.targets == 1:
-            found, circle = simplest(seen.t, x, modes, told, law, apart)
+            found, circle = simplest(seen.t, x, modes, law, apart)
         elif seen.targets == 1 and law["library"] is None:
-            found = _where_it_moves(seen.t, x, told, law, apart)
+            found = _where_it_moves(seen.t, x, modes, law, apart)
         else:
-            found = dynamics.discover(seen.t, x, systematic=told, **law)
+            found = dynamics.discover(seen.t, x, systematic=modes, **law)
     axes = np.eye(len(moves))[moves]
     if circle is not None:
         spread = axes.T @ circle.centre_covariance @ axes
@@ -961,7 +955,7 @@ def with_law(
 
 
 def simplest(
-    t: Floats, x: Floats, modes: Floats, told: Floats, law: dict[str, Any], apart: float = 0.0
+    t: Floats, x: Floats, modes: Floats, law: dict[str, Any], apart: float = 0.0
 ) -> tuple[Discovery, Round | None]:
     """Of nested laws of a body the simplest that the data bear.
 
@@ -975,8 +969,6 @@ def simplest(
         Places, a row with a NaN where they are not known.
     modes : ndarray, shape (k, n, m)
         Errors that all places share.
-    told : ndarray, shape (k', n, m)
-        Those of them that do not bend the paths of linear forces.
     law : dict
         What else `discover` takes.
     apart : float
@@ -987,7 +979,7 @@ def simplest(
     flight = dynamics.homogeneous(t[rows], x[rows], names, modes[:, rows])
     if flight is not None:
         return flight, None
-    found = _where_it_moves(t, x, told, law, apart, degree=1, order=2)
+    found = _where_it_moves(t, x, modes, law, apart, degree=1, order=2)
     swing = found.swing
     if swing is None:
         return found, None

@@ -202,8 +202,7 @@ def discover_from_video(
         tracks=(pixels,), rig=rig, lags=Lags(zero, zero + 1, zero, 0.0, clocks=(clock,)),
         t=t, x=x @ SPACE, systematic=modes @ SPACE, warnings=tuple(warnings),
     )  # fmt: skip
-    # A plane that lies askew bends a path a little as other forces would.
-    found = PlaneDiscovery(**vars(with_law(seen, [name], asked, straight=1)), unit=unit)
+    found = PlaneDiscovery(**vars(with_law(seen, [name], asked)), unit=unit)
     if found.leaning:
         borne = (
             f"{found.leaning:.0f} degrees off the vertical: something bears it, its pull is no g"

@@ -722,9 +722,9 @@ def _late(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
             found.append((gain, fewer, law.names[j], -float(sizes[-1])))
     if found:
         gain, fewer, name, size = max(found)
-        terms, when = "terms" if fewer > 1 else "term", "later" if size > 0 else "earlier"
+        what, when = "terms" if fewer > 1 else "term", "later" if size > 0 else "earlier"
         yield (
-            f"the law has {fewer} {terms} less if {name} was measured {abs(size):.2g} of a step "
+            f"the law has {fewer} {what} less if {name} was measured {abs(size):.2g} of a step "
             f"{when} than its times say (criterion {-gain:+.4g}): correct it, or give systematic="
         )
 
