@@ -91,7 +91,6 @@ def test_masked_entries_are_missing(dtype):
 
 
 def test_messages_name_the_remedy():
-    """Dates, time differences, one coordinate, single precision, which of many, the times."""
     t = np.linspace(0, 10, 60)
     x = np.c_[np.cos(t), -np.sin(t)]
     stamps = [datetime(2024, 3, 1) + timedelta(seconds=s) for s in t]

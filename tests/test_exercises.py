@@ -65,13 +65,11 @@ def test_exercises_are_their_solutions_with_blank_cells(path):
 @pytest.mark.notebooks
 @pytest.mark.parametrize("path", SOLUTIONS, ids=lambda path: path.stem)
 def test_solutions_are_right(path):
-    """From another seed than that of the executed half."""
     run_cells(jupytext.read(path), seed=1)
 
 
 @pytest.mark.parametrize("path", SOLUTIONS, ids=lambda path: path.stem)
 def test_a_wrong_letter_is_not_right(path):
-    """Of the checks that know an answer by its checksum."""
     for cell in jupytext.read(path).cells:
         for check in re.findall(r"^assert crc32\(f.*\{answer\}.*$", cell.source, re.MULTILINE):
             with pytest.raises(AssertionError, match="not yet"):

@@ -168,7 +168,6 @@ READERS = {
 @pytest.mark.parametrize("name", [*RIGHT, *METHODS, *READERS])
 @pytest.mark.parametrize("examples", [12, pytest.param(150, marks=pytest.mark.thorough)])
 def test_odd_ones(name, examples, tmp_path):
-    """A call with odd arguments, or a file of odd content."""
 
     @settings(max_examples=examples, suppress_health_check=list(HealthCheck))
     @given(data=st.data())

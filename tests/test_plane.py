@@ -55,9 +55,6 @@ def pixels_of(x):
     return np.column_stack([640 + SCALE * x[:, 0], 500 - SCALE * x[:, 1]])
 
 
-# ------------------------------------------------------------ laws that are the same at every place
-
-
 @pytest.mark.parametrize("seed", range(2))
 def test_a_throw_is_a_constant_force(seed):
     rng = np.random.default_rng(seed)
@@ -114,9 +111,6 @@ def test_motions_that_are_no_plain_flight():
     assert homogeneous(t, noisy(swings, 0), ("x", "y")) is None
 
 
-# ------------------------------------------------------------------------- from pixels to the plane
-
-
 def placed(pixels, length=None, up=None, corners=None, size=(1280, 720)):
     """Where pixels are in the plane."""
     marks, places, _ = plane.four_places(length, up, corners, size)
@@ -165,9 +159,6 @@ def test_what_is_no_scale_is_refused(monkeypatch, given, message):
     filmed(monkeypatch, pixels_of(flight()[1]), fps=rate)
     with pytest.raises(ValueError, match=message):
         vl.discover_from_video("throw.mp4", **given)
-
-
-# ---------------------------------------------------------------------------------------- the whole
 
 
 def test_a_film_that_was_cut_off_is_told(monkeypatch):

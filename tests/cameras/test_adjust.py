@@ -112,7 +112,6 @@ def test_many_measurements_that_are_a_little_off_are_told_together(times, told):
 
 
 def test_how_well_a_camera_is_known():
-    """A tangential distortion is ten times as small as a radial one."""
     image = {"principal_point_error": 4.0, "distortion_error": 0.3, "readout_error": 0.2}
     errors = {"normal_error": 2.0, "scale_error": 0.03, "position_error": 0.5, **image}
     place = {"position": (0, 0, 9), "normal": (0, 0, 1)}
@@ -169,7 +168,6 @@ def test_errors_of_cameras_are_as_large_as_stated(path, frames, memory, draws, m
 
 
 def test_trails_follow_the_motion():
-    """Half of the noise that the residuals show, backwards along the motion in each image."""
     x, rig, tracks = seen(4, 80, 0.3)
     tracks[1][20] = np.nan
     modes = tracking_errors(tracks, rig)

@@ -299,7 +299,6 @@ def test_a_template_is_a_rig_with_a_known_camera_evenly_around(tmp_path, cameras
 
 
 def test_what_a_hand_measures(tmp_path):
-    """A field of view of 90 degrees shows at one metre two metres; a roll turns the z axis left."""
     path = tmp_path / "rig.toml"
     text = """
 [[camera]]

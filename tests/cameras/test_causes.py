@@ -80,7 +80,6 @@ def test_one_camera_is_blamed_where_all_would_explain_as_much(part):
 
 @pytest.mark.parametrize(("rho", "learned"), [(0.0, False), (0.8, True), (0.95, False)])
 def test_a_good_rig_and_poor_tracks_are_no_reason_to_doubt(rho, learned):
-    """Residuals of 1 to 1.5 pixels, as good calibrations of real recordings leave them."""
     rng = np.random.default_rng([0, 11])
     rig = room(rng, 4)
     exact = [camera.project(walk(FRAMES)) for camera in rig.cameras]

@@ -252,7 +252,6 @@ def test_a_file_keeps_every_digit(tmp_path_factory, seed):
 
 
 def test_a_ball_through_a_lens():
-    """Its image is where its outline is seen, and its shape that of the outline."""
     rng = np.random.default_rng(3)
     camera = any_camera(rng)
     plain = replace(camera, distortion=None, principal_point=None, aspect=1.0)

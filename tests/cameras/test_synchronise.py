@@ -289,7 +289,6 @@ def test_clocks_that_are_none(clocks, message):
 
 
 def test_lags_and_rolling_shutters_are_told_apart():
-    """Both move a track in time, the one by where the target is."""
     rng = np.random.default_rng(8)
     rig, lags = room(rng, 4, readout=0.4), (0, 6.3, -4.6, 0.5)
     tracks = shot(rng, rig, np.arange(400), lags, 0.2, lambda k: walk(2 * k))
@@ -374,7 +373,6 @@ def test_files_that_state_their_rates():
 
 @pytest.mark.parametrize(("rate", "same"), [(30.29, True), (30.31, False), (np.nan, True)])
 def test_given_times_are_for_files_of_one_rate(rate, same):
-    """Within one in a hundred; a file that states none has that of the others."""
 
     def use():
         return Clock.of_videos([30, rate], [np.arange(3.0)] * 2, [0, 0.5, 1])

@@ -196,8 +196,6 @@ def test_an_axis_is_not_at_home_for_the_asking_where_others_have_left():
     assert "the law's origin is in z: other terms around another" in told
 
 
-# ------------------------------------------------------------------------- terms beyond the library
-
 TIMES = np.linspace(0, 20, 600)
 WORDS = "terms that the law has not explain what it leaves"
 

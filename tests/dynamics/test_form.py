@@ -157,8 +157,6 @@ def test_columns_name_the_variables():
         assert vl.discover(T, frame(*names), degree=1).system.names == ("x", "y")
 
 
-# ------------------------------------------------------------------------------ what was never seen
-
 OSCILLATOR = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -4, "y": -0.1, "x^3": -1}})
 TIED = Library.polynomial(3).where({"x": {"y": 1, "...": 0}})
 LONG = np.linspace(0, 20, 600)

@@ -76,7 +76,6 @@ def own_errors(fit, model):
 def test_axes_that_are_not_known_make_errors_larger_unless_terms_leave_them_open(
     law, degree, start, live
 ):
-    """Those that are left open are a choice, and no error."""
     found, problem, fit = solved(*sampled(law, degree, start), degree)
     assert found.native.support.sum() == live
     known, learned = own_errors(fit, problem.model(fit)), own_errors(fit, with_turns(problem, fit))

@@ -129,8 +129,6 @@ def test_numbers_have_the_digits_that_their_errors_allow(number, text):
     assert _with_error(*number, "x") == text
 
 
-# ------------------------------------------------------------------ functions of one's own in files
-
 T = np.linspace(0, 20, 400)
 HELD = Library.terms({"restoring": lambda x: np.sin(x), "away": lambda x: 1 / (4 - x)})
 
@@ -194,8 +192,6 @@ def test_every_plateau_is_drawn_and_the_law_is_marked_where_it_holds(found):
     plt.close(figure)
 
 
-# ----------------------------------------------------------------------------------- what is absent
-
 TURNS = np.linspace(0, 20, 200)
 ALLOWED = {"x": {"y": None, "x^2": None, "...": 0}}
 
@@ -212,7 +208,6 @@ def found_in(law, seed, library=None, noise=0.05):
 
 
 def test_intervals_hold_what_is_absent():
-    """Nothing, and a term too weak to be found."""
     covered, weak = [], []
     for seed in range(4):
         one = found_in(weak_spring(), seed).absent

@@ -157,7 +157,6 @@ def test_six_springs_have_their_law_though_cubics_interpolate_their_path():
 
 
 def test_a_law_outside_the_library_is_no_body():
-    """Flows of one and two states (Gompertz, saturated growth, a pendulum and its rate)."""
     flows = {
         (0.8,): lambda _, x: 0.32 * x * np.log(2.9 / x),
         (2.0,): lambda _, x: 0.5 * x * (1 - x / 20) - x**2 / (1 + x**2),

@@ -85,7 +85,6 @@ def test_what_cannot_be_compared_is_refused(compare, one, other, message):
 
 
 def test_an_unknown_origin_agrees_with_its_closed_form():
-    """x = c + a exp(-k t) around an unknown c."""
     t = np.linspace(0, 3, 60)
     law = PolynomialSystem.from_terms({"x": {"x": -1.0}})
     bound = cramer_rao_bound(law, t, [2.0], [0.1], moving=[True])
@@ -101,7 +100,6 @@ def test_an_unknown_origin_agrees_with_its_closed_form():
 
 
 def test_a_nonlinear_law_in_the_plane_agrees_with_differences():
-    """A damped hardening spring, each coordinate with its own noise."""
     terms = {"x": {"y": 1.1}, "y": {"x": -0.7, "y": -0.2, "x^3": -0.4}}
     law, t, sigma = PolynomialSystem.from_terms(terms), np.linspace(0, 6, 50), np.array([0.1, 0.03])
     bound = cramer_rao_bound(law, t, [1.2, 0.3], sigma)

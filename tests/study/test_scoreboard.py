@@ -46,7 +46,6 @@ def test_the_lorenz_grid_is_that_of_its_authors():
 
 
 def test_outcomes_are_counted(monkeypatch):
-    """Of a right law, a wrong one, and none at all."""
     truth = LorenzContest(4, 0.1).data().truth
 
     def find(method, t, x, systematic, seed, degree, origin):
