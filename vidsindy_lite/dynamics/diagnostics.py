@@ -696,7 +696,8 @@ def _late(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
     """Would the law be sparser if one coordinate was measured later or earlier than all others?
 
     What is late obeys a law, too, in which combinations of the state and its slope, more terms,
-    stand in place of a coordinate. As of two origins, that of the sparser law is the likelier one.
+    stand in place of a coordinate. As of two origins, that of the sparser law is the likelier one;
+    a lag is a number, too, and takes the place of one term.
     """
     state, collocation = fit.state, fit.collocation
     seen = np.flatnonzero(collocation.counts[: problem.measured[0][1].shape[1]]).tolist()
@@ -718,14 +719,14 @@ def _late(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
         fewer = int((support & priced).sum() - (terms & priced).sum())
         gain = own - (beside.objective(state) - model.fall + value)
         sizes = model.sizes + model.shared @ np.append(1.0, solution - present)
-        if fewer > 0 and gain > STRONG:
+        if fewer > 1 and gain > STRONG:
             found.append((gain, fewer, law.names[j], -float(sizes[-1])))
     if found:
         gain, fewer, name, size = max(found)
-        what, when = "terms" if fewer > 1 else "term", "later" if size > 0 else "earlier"
+        when = f"{abs(size):.2g} of a step {'later' if size > 0 else 'earlier'}"
         yield (
-            f"the law has {fewer} {what} less if {name} was measured {abs(size):.2g} of a step "
-            f"{when} than its times say (criterion {-gain:+.4g}): correct it, or give systematic="
+            f"the law has {fewer} terms less if {name} was measured {when} than its times say "
+            f"(criterion {-gain:+.4g}): correct it, or give systematic="
         )
 
 
