@@ -705,10 +705,10 @@ def _late(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
         return
     each = zip(fit.splines, collocation.segments, strict=True)
     step = typical_step(problem.trajectories) * np.concatenate([c(s.t, 1) for c, s in each])
-    columns = problem.columns(state)
+    columns = np.flatnonzero(state.free())  # of which some are one too many
     costs, present = problem.costs(columns), state.flat()[columns]
-    support, priced = state.free()[columns], np.isfinite(costs)
-    own, found = collocation.objective(state) + costs[support & priced].sum(), []
+    support, priced = np.ones(len(columns), dtype=bool), np.isfinite(costs)
+    own, found = collocation.objective(state) + costs[priced].sum(), []
     for j in seen:
         later = (step * (np.arange(problem.d) == j))[..., None]
         shared = np.concatenate([collocation.systematic, later], axis=2)
@@ -716,7 +716,7 @@ def _late(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
         model = beside.linearise(state, columns)
         start = model.information, model.gradient, present, costs, support
         terms, solution, value = subset_search(*start)
-        fewer = int((support & priced).sum() - (terms & priced).sum())
+        fewer = int((priced & ~terms).sum())
         gain = own - (beside.objective(state) - model.fall + value)
         sizes = model.sizes + model.shared @ np.append(1.0, solution - present)
         if fewer > 1 and gain > STRONG:
