@@ -506,9 +506,7 @@ def without_wild(track: Floats, name: str) -> tuple[Floats, str]:
     Without such a place those beside it are on one path, as they are not where a target bounces.
     """
     kept = seen = np.flatnonzero(np.isfinite(track).all(axis=1))
-    most, wild = len(seen) // 10, list[int]()
-    # Medians of what places miss their neighbours by, from which on one is no motion.
-    limit = max(8.0 * float(np.median(_missed(seen, track))), cameras.GROSS) if most else np.inf
+    most, wild, limit = len(seen) // 10, list[int](), _smoothest(seen, track)
     while len(seen) <= len(kept) + most and ((apart := _missed(kept, track)) > limit).any():
         highest = sliding_window_view(np.pad(apart, 4), 9).max(axis=1)
         # The first three miss the same neighbours, by the same, and so do the last three.
@@ -524,6 +522,19 @@ def without_wild(track: Floats, name: str) -> tuple[Floats, str]:
     cleared = track.copy()
     cleared[wild] = np.nan
     return cleared, left_out(name, "far from their neighbours", wild)
+
+
+def kinks(track: Floats) -> Ints:
+    """Frames at which a track, (n, 2), turns as no smooth motion does: it bounces, or is hit."""
+    seen = np.flatnonzero(np.isfinite(track).all(axis=1))
+    return seen[_missed(seen, track) > _smoothest(seen, track)]
+
+
+def _smoothest(rows: Ints, track: Floats) -> float:
+    """What places may miss their neighbours by: from so many medians on, one is no motion."""
+    if len(rows) < 10:
+        return np.inf
+    return max(8.0 * float(np.median(_missed(rows, track))), cameras.GROSS)
 
 
 def _missed(rows: Ints, track: Floats) -> Floats:

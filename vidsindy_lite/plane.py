@@ -23,6 +23,7 @@ from .pipeline import (
     VideoDiscovery,
     check_found,
     directions,
+    kinks,
     law_options,
     noted,
     times_of,
@@ -130,7 +131,8 @@ def discover_from_video(
         marks, a pixel each, comes on top.
     frames : (first, last), optional
         What counts of the film, from 0 and both included: the target may be in a hand before, or on
-        the ground after that. By default all but the rest of what is held still and then let go.
+        the ground after that. By default the longest part without a bounce or a hit, but for the
+        rest of what is held still and then let go.
     individual : str, optional
         Which of several targets of a text file; see `read_tracks`.
     hint, detector
@@ -192,8 +194,11 @@ def discover_from_video(
         pixels = _between(frames, pixels, first)
     check_found([pixels], [name], 1, [warnings])
     pixels, left_out = without_wild(pixels, name)
-    pixels, held = _let_go(pixels, first) if frames is None else (pixels, "")
-    rig = noted(rig, left_out, held)
+    hits = held = ""
+    if frames is None:
+        pixels, hits = _unhit(pixels, first)
+        pixels, held = _let_go(pixels, first)
+    rig = noted(rig, left_out, hits, held)
     x = carry(to_plane, pixels)
     known = slice(3 if corners is None else 1) if measured else slice(0)
     modes = np.stack([error * x, *_tilts(camera, pixels, middle)])[known]
@@ -212,10 +217,10 @@ def discover_from_video(
     contradicted = _contradicted(found, up is not None or corners is not None, corners is None)
     if found.warnings != seen.warnings and frames is None:
         contradicted.append(
-            f"frames: all{' after its rest' if held else ''} were taken to be of one motion: if it "
-            "begins in a hand or ends on the ground, give the first and the last frame that count; "
-            "and before a plain wall, which does not show how a hand trembles, the phone has to "
-            "stand on something"
+            f"frames: all{' of these' if hits or held else ''} were taken to be of one motion: if "
+            "it begins in a hand or ends on the ground, give the first and the last frame that "
+            "count; and before a plain wall, which does not show how a hand trembles, the phone "
+            "has to stand on something"
         )
     law = replace(found.discovery, warnings=(*found.warnings, *contradicted))
     return replace(found, warnings=law.warnings, discovery=law)
@@ -266,6 +271,27 @@ def _between(frames: Sequence[int], pixels: Floats, start: int) -> Floats:
             f"{start} to {start + len(pixels) - 1}, got {first:g}, {last:g}"
         )
     return np.where((number >= first) & (number <= last), pixels, np.nan)
+
+
+def _unhit(pixels: Floats, start: int) -> tuple[Floats, str]:
+    """The longest part of a track in which nothing hits the target, and what to say of it.
+
+    It starts at some frame. Parts are long enough for a law if they hold ten frames.
+    """
+    turns = kinks(pixels)
+    ends = np.concatenate([[-1], turns, [len(pixels)]])
+    longest = int(np.diff(ends).argmax())
+    first, last = int(ends[longest]) + 1, int(ends[longest + 1]) - 1
+    if not len(turns) or last - first < 10:
+        return pixels, ""
+    number = np.arange(len(pixels))[:, None]
+    places = np.split(turns, np.flatnonzero(np.diff(turns) > 2) + 1)
+    each = ", ".join(str(start + int(np.median(one))) for one in places[:5])
+    told = (
+        f"it turns sharply at frames {each}, as where it bounces, is hit, or frames lack: counted "
+        f"from {start + first} to {start + last}"
+    )
+    return np.where((number >= first) & (number <= last), pixels, np.nan), told
 
 
 def _let_go(pixels: Floats, start: int) -> tuple[Floats, str]:
