@@ -294,7 +294,7 @@ def test_what_bounces_counts_between_two_bounces(monkeypatch):
     height = 1 - 9.81 * ((t + lap) % (2 * lap) - lap) ** 2 / 2
     filmed(monkeypatch, pixels_of(noisy(np.column_stack([0.4 * t, height]), 0)))
     found = vl.discover_from_video("ball.mp4", STICK)
-    assert "it turns sharply at frames 13" in found.rig.note
+    assert "it turns sharply at frames 14, 41, as where it bounces" in found.rig.note
     assert (found.status, abs(found.g.value - 9.81) < 2 * found.g.error) == ("ok", True)
 
 
