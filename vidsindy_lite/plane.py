@@ -8,6 +8,7 @@ one before it, the simplest is taken that the data bear: forces that are the sam
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -131,8 +132,8 @@ def discover_from_video(
         marks, a pixel each, comes on top.
     frames : (first, last), optional
         What counts of the film, from 0 and both included: the target may be in a hand before, or on
-        the ground after that. By default the longest part without a bounce or a hit, but for the
-        rest of what is held still and then let go.
+        the ground after that. By default all but the rest of what is held still and then let go; the
+        longest part without a bounce or a hit, where that alone has a law beyond doubt.
     individual : str, optional
         Which of several targets of a text file; see `read_tracks`.
     hint, detector
@@ -194,36 +195,44 @@ def discover_from_video(
         pixels = _between(frames, pixels, first)
     check_found([pixels], [name], 1, [warnings])
     pixels, left_out = without_wild(pixels, name)
-    hits = held = ""
-    if frames is None:
-        pixels, hits = _unhit(pixels, first)
-        pixels, held = _let_go(pixels, first)
-    rig = noted(rig, left_out, hits, held)
-    x = carry(to_plane, pixels)
-    known = slice(3 if corners is None else 1) if measured else slice(0)
-    modes = np.stack([error * x, *_tilts(camera, pixels, middle)])[known]
     zero, clock = np.zeros(1), np.arange(len(t), dtype=float)
-    seen = Observation(
-        tracks=(pixels,), rig=rig, lags=Lags(zero, zero + 1, zero, 0.0, clocks=(clock,)),
-        t=t, x=x @ SPACE, systematic=modes @ SPACE, warnings=tuple(warnings),
-    )  # fmt: skip
-    found = PlaneDiscovery(**vars(with_law(seen, [name], asked)), unit=unit)
-    if found.leaning:
-        borne = (
-            f"{found.leaning:.0f} degrees off the vertical: something bears it, its pull is no g"
-        )
-        law = replace(found.discovery, force="pull")
-        found = replace(found, rig=noted(rig, f"along a line {borne}"), discovery=law)
-    contradicted = _contradicted(found, up is not None or corners is not None, corners is None)
-    if found.warnings != seen.warnings and frames is None:
-        contradicted.append(
-            f"frames: all{' of these' if hits or held else ''} were taken to be of one motion: if "
-            "it begins in a hand or ends on the ground, give the first and the last frame that "
-            "count; and before a plain wall, which does not show how a hand trembles, the phone "
-            "has to stand on something"
-        )
-    law = replace(found.discovery, warnings=(*found.warnings, *contradicted))
-    return replace(found, warnings=law.warnings, discovery=law)
+
+    def law_of(pixels: Floats, *cuts: str) -> PlaneDiscovery:
+        """The law of what is left of a track after some cuts."""
+        x = carry(to_plane, pixels)
+        known = slice(3 if corners is None else 1) if measured else slice(0)
+        modes = np.stack([error * x, *_tilts(camera, pixels, middle)])[known]
+        seen = Observation(
+            tracks=(pixels,), rig=noted(rig, left_out, *cuts),
+            lags=Lags(zero, zero + 1, zero, 0.0, clocks=(clock,)),
+            t=t, x=x @ SPACE, systematic=modes @ SPACE, warnings=tuple(warnings),
+        )  # fmt: skip
+        found = PlaneDiscovery(**vars(with_law(seen, [name], asked)), unit=unit)
+        if found.leaning:
+            line = f"along a line {found.leaning:.0f} degrees off the vertical: something bears it"
+            law = replace(found.discovery, force="pull")
+            found = replace(found, rig=noted(found.rig, f"{line}, its pull is no g"), discovery=law)
+        contradicted = _contradicted(found, up is not None or corners is not None, corners is None)
+        if found.warnings != seen.warnings and frames is None:
+            contradicted.append(
+                f"frames: all{' of these' if any(cuts) else ''} were taken to be of one motion: if "
+                "it begins in a hand or ends on the ground, give the first and the last frame that "
+                "count; and before a plain wall, which does not show how a hand trembles, the "
+                "phone has to stand on something"
+            )
+        law = replace(found.discovery, warnings=(*found.warnings, *contradicted))
+        return replace(found, warnings=law.warnings, discovery=law)
+
+    if frames is not None:
+        return law_of(pixels)
+    pixels, held = _let_go(pixels, first)
+    found = law_of(pixels, held)
+    if found.status != "ok":
+        part, hits = _unhit(pixels, first)
+        with suppress(ValueError):  # of a part that holds too little
+            other = law_of(part, held, hits) if hits else found
+            found = other if other.status == "ok" else found
+    return found
 
 
 #: Times, pixels, the number of the first frame, and doubts.
