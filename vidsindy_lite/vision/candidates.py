@@ -206,8 +206,7 @@ class Candidates(NamedTuple):
 
     def only(self, rows: Ints | Bools | slice) -> Self:
         """Some of the rows."""
-        columns: list[Any] = [column[rows] for column in self]
-        return type(self)(*columns)
+        return type(self)._make(column[rows] for column in self)
 
     @classmethod
     def joined(cls, parts: Iterable[Candidates]) -> Candidates:
@@ -458,8 +457,7 @@ def plainest_paths(seen: Candidates, most: int = 3, *, away: bool = False) -> li
         box, own = box[seen.frame[left]], seen.box[left]
         apart = np.abs(box[:, :2] + box[:, 2:] / 2 - own[:, :2] - own[:, 2:] / 2)
         with np.errstate(invalid="ignore"):
-            part = (apart <= np.maximum(box[:, 2:], own[:, 2:]) / 2 + 1).all(axis=1)
-        left = left[~part]
+            left = left[~(apart <= np.maximum(box[:, 2:], own[:, 2:]) / 2 + 1).all(axis=1)]
     return sorted(found, key=lambda path: -path.rating)
 
 

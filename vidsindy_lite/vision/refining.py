@@ -123,8 +123,7 @@ class Lens:
         """Centroid, area and skewness of one connected part."""
         near = cv2.dilate(label.astype(np.uint8), _CORE) > 0
         core = cv2.erode(label.astype(np.uint8), _CORE) > 0
-        square = dot(contrast, contrast)
-        alpha = dot(change, contrast) / np.maximum(square, self.least**2)
+        alpha = dot(change, contrast) / np.maximum(dot(contrast, contrast), self.least**2)
         alpha = np.clip(alpha, 0, 1)
         alpha[core] = 1
         alpha[~near] = 0
