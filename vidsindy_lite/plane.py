@@ -204,11 +204,9 @@ def discover_from_video(
     )  # fmt: skip
     found = PlaneDiscovery(**vars(with_law(seen, [name], asked)), unit=unit)
     if found.leaning:
-        borne = (
-            f"{found.leaning:.0f} degrees off the vertical: something bears it, its pull is no g"
-        )
-        law = replace(found.discovery, force="pull")
-        found = replace(found, rig=noted(rig, f"along a line {borne}"), discovery=law)
+        off = f"{found.leaning:.0f} degrees off the vertical"
+        rig = noted(rig, f"along a line {off}: something bears it, its pull is no g")
+        found = replace(found, rig=rig, discovery=replace(found.discovery, force="pull"))
     contradicted = _contradicted(found, up is not None or corners is not None, corners is None)
     if found.warnings != seen.warnings and frames is None:
         contradicted.append(
@@ -357,11 +355,9 @@ def _upwards(up: Sequence[float] | None) -> Floats:
 def homography_of(marks: Floats, places: Floats) -> Floats:
     """The homography, (3, 3), that takes four pixels to places, (4, 2) each."""
     ones = np.column_stack([marks, np.ones(4)])
-    rows = [
-        np.hstack([np.kron(np.eye(2)[axis], ones), -places[:, axis, None] * marks])
-        for axis in (0, 1)
-    ]
-    return np.append(np.linalg.solve(np.vstack(rows), places.T.ravel()), 1.0).reshape(3, 3)
+    wanted, twice = places.T.ravel(), np.vstack([marks, marks])
+    rows = np.hstack([np.kron(np.eye(2), ones), -wanted[:, None] * twice])
+    return np.append(np.linalg.solve(rows, wanted), 1.0).reshape(3, 3)
 
 
 def _tilts(camera: PlaneCamera, pixels: Floats, middle: Floats) -> list[Floats]:

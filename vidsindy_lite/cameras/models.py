@@ -408,8 +408,7 @@ def undistorted(points: Floats, coefficients: Floats) -> Floats:
     enough = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 20_000, 1e-14)
     found, seen = np.full(points.shape, np.nan), np.isfinite(points).all(axis=1)
     if seen.any():  # a NaN would be tried to the last iteration, and no points are refused
-        given = points[seen, None]
-        ideal = cv2.undistortPoints(given, np.eye(3), coefficients, criteria=enough)
+        ideal = cv2.undistortPoints(points[seen, None], np.eye(3), coefficients, criteria=enough)
         found[seen] = ideal[:, 0]
     found[~(np.abs(distorted(found, coefficients) - points).max(axis=1) < 1e-7)] = np.nan
     return found

@@ -120,11 +120,10 @@ def align(before: Look, after: Look, guess: Floats) -> Aligned | None:
     found = Aligned(_as_similarity(guess, size), np.inf)
     for level in range(len(before.levels), 0, -1):
         scale, back = (np.diag([x, x, 1.0]) for x in (0.5**level, 2.0**level))
-        here = scale @ found.map @ back
         # Grey levels from which on a pixel is left aside.
         loose = 40.0 if level > 1 else 0.0
         both = before.slopes[level - 1], after.levels[level - 1]
-        fitted = _fit(*both, here, scale[0, 0], loose)
+        fitted = _fit(*both, scale @ found.map @ back, scale[0, 0], loose)
         if fitted is None:
             return None
         found = Aligned(back @ fitted.map @ scale, 2 * fitted.error)
