@@ -303,8 +303,7 @@ def _observed(
                 # Parallel projections of a plane tell of no lens.
                 if len(far.variance) < 3 and not far.lags.warnings:
                     return affine
-            tried = [films.lags, *([far.lags.frames] if far and lags is None else [])]
-            for begun in tried:
+            for begun in [films.lags, *([far.lags.frames] if far and lags is None else [])]:
                 try:
                     rig = cameras.posed(replace(films, lags=begun).aligned, rig, lags is not None)
                     break

@@ -341,8 +341,7 @@ class Clock:
         """That of footage which was put right; the times are those of its first video."""
         times, old, new = self.times, self.frames[0], footage.instants
         if footage.lasting != 1 or not np.array_equal(new, old):
-            step = footage.lasting * np.ptp(times) / np.ptp(old)
-            times = times[0] + step * new
+            times = times[0] + footage.lasting * np.ptp(times) / np.ptp(old) * new
         return Clock(times, footage.rates, footage.clocks)
 
     @classmethod
