@@ -195,8 +195,7 @@ class Curve:
         """
         seen, _ = self._seen
         back, on = (np.clip(frames + step, seen[0], seen[-1]) for step in (-1, 1))
-        width = np.maximum(on - back, 1)[..., None]
-        return (self._spline(on) - self._spline(back)) / width
+        return (self._spline(on) - self._spline(back)) / np.maximum(on - back, 1)[..., None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -212,8 +212,7 @@ class Camera(ABC):
     @property
     def table(self) -> dict[str, object]:
         """Its model and plain numbers, under the keys of a rig file; defaults are left out."""
-        plain = type(self) is OrthographicCamera
-        known: dict[str, object] = {} if plain else {"model": self.model}
+        known: dict[str, object] = {} if type(self) is OrthographicCamera else {"model": self.model}
         for part in fields(self):
             value = getattr(self, part.name)
             default = isinstance(value, float) and value == part.default

@@ -336,8 +336,7 @@ def _promising(footage: Footage, i: int, rank: int) -> list[float]:
     """Whole lags of a view at which less is left than at their neighbours, the best first."""
     lengths = footage.lengths
     tried = np.arange(np.ceil(_least(footage) - lengths[i]), lengths[0] - _least(footage) + 1)
-    every = np.zeros((len(tried), len(lengths)))
-    every[:, i] = tried
+    every = np.outer(tried, np.eye(len(lengths))[i])
     return dips(tried, np.array([_left(footage, lags, (0, i), rank) for lags in every]))
 
 

@@ -341,9 +341,7 @@ def _distinct(found: Candidates) -> Candidates:
     for k in range(len(same)):
         if not same[k, kept].any():
             kept.append(k)
-        if len(kept) == _KEPT:
-            break
-    return found.only(np.array(kept, int))
+    return found.only(np.array(kept[:_KEPT], int))
 
 
 def _uncommon(found: Candidates, targets: int) -> Candidates:
