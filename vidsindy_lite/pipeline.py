@@ -192,9 +192,8 @@ def observe(
     tracks = [np.hstack([track.pixels for track in found]) for found in seen]
     told = [[warning for track in found for warning in track.warnings] for found in seen]
     check_found(tracks, names, targets, told)
-    doubts = sum(told, [])
     conclude = _observed if targets == 1 else _several_observed
-    return conclude(tracks, rig, clock, starts, names, doubts, progress)
+    return conclude(tracks, rig, clock, starts, names, sum(told, []), progress)
 
 
 def observe_tracks(
@@ -304,8 +303,7 @@ def _observed(
                 # Parallel projections of a plane tell of no lens.
                 if len(far.variance) < 3 and not far.lags.warnings:
                     return affine
-            tried = [films.lags, *([far.lags.frames] if far and lags is None else [])]
-            for begun in tried:
+            for begun in [films.lags, *([far.lags.frames] if far and lags is None else [])]:
                 try:
                     rig = cameras.posed(replace(films, lags=begun).aligned, rig, lags is not None)
                     break
@@ -568,12 +566,8 @@ def check_found(
     for pixels, name, causes in zip(tracks, names, told, strict=True):
         found = int(np.isfinite(pixels).any(axis=0).sum()) // 2
         if found < targets:
-            raise Refused(
-                f"paths: {name} must show {wanted}, got {found or 'none'} in any frame: "
-                f"{'; '.join((*causes, still))}",
-                "track",
-                tracks,
-            )
+            got = f"got {found or 'none'} in any frame: {'; '.join((*causes, still))}"
+            raise Refused(f"paths: {name} must show {wanted}, {got}", "track", tracks)
 
 
 def _apart(lags: Floats, learned: Lags, limit: float) -> bool:

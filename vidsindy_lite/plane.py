@@ -132,8 +132,8 @@ def discover_from_video(
         marks, a pixel each, comes on top.
     frames : (first, last), optional
         What counts of the film, from 0 and both included: the target may be in a hand before, or on
-        the ground after that. By default all but the rest of what is held still and then let go; the
-        longest part without a bounce or a hit, where that alone has a law beyond doubt.
+        the ground after that. By default all but the rest of what is held still and then let go; or
+        the longest part without a bounce or a hit, where that alone has a law beyond doubt.
     individual : str, optional
         Which of several targets of a text file; see `read_tracks`.
     hint, detector
@@ -392,11 +392,9 @@ def _upwards(up: Sequence[float] | None) -> Floats:
 def homography_of(marks: Floats, places: Floats) -> Floats:
     """The homography, (3, 3), that takes four pixels to places, (4, 2) each."""
     ones = np.column_stack([marks, np.ones(4)])
-    rows = [
-        np.hstack([np.kron(np.eye(2)[axis], ones), -places[:, axis, None] * marks])
-        for axis in (0, 1)
-    ]
-    return np.append(np.linalg.solve(np.vstack(rows), places.T.ravel()), 1.0).reshape(3, 3)
+    wanted, twice = places.T.ravel(), np.vstack([marks, marks])
+    rows = np.hstack([np.kron(np.eye(2), ones), -wanted[:, None] * twice])
+    return np.append(np.linalg.solve(rows, wanted), 1.0).reshape(3, 3)
 
 
 def _tilts(camera: PlaneCamera, pixels: Floats, middle: Floats) -> list[Floats]:

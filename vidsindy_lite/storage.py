@@ -129,10 +129,7 @@ def read_tree(name: str, path: Path, suffix: str) -> Any:
         except (cv2.error, SystemError):
             keys = ", ".join(re.findall(r"^<?(\w+)[^:>\n]*[:>]", text, re.MULTILINE)[:5])
             raise ValueError(f"OpenCV cannot read it, which holds {keys or 'no keys'}") from None
-        try:
-            return _plain(storage.root())
-        finally:
-            storage.release()
+        return _plain(storage.root())
 
 
 def _depth(text: str, suffix: str) -> int:

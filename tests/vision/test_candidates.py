@@ -20,7 +20,7 @@ def found_in(*parts, colour=(20, 40, 220), behind=(90, 100, 110), level=1.0):
     for left, top, width, height, strong in parts:
         place = np.s_[top : top + height, left : left + width]
         strength[place], frame[place] = strong, colour
-    return candidates.components(strength, level, frame, ground)
+    return candidates.components(strength, level, frame, ground, 1.0, False)
 
 
 def test_a_thing_is_where_it_differs():

@@ -346,14 +346,14 @@ def along(n, areas=100.0, half=5.0, **looks):
 
 def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
     views, errors, maps = along(20), np.zeros(20), np.tile(np.eye(3), (20, 1, 1))
-    assert finished(views, CameraMotion(maps, errors), ())[0].warnings == ()
+    assert finished(views, CameraMotion(maps, errors), (), np.arange(20.0))[0].warnings == ()
     larger = along(40, np.where(np.arange(40) < 20, 100.0, 300.0))
-    (doubt,) = finished(larger, at_rest(40), ())[0].warnings
+    (doubt,) = finished(larger, at_rest(40), (), np.arange(40.0))[0].warnings
     assert doubt.startswith("from frame 22 on, what is followed has another size at once")
-    few, _ = finished(along(9) + [None] * 191, at_rest(200), ())
+    few, _ = finished(along(9) + [None] * 191, at_rest(200), (), np.arange(200.0))
     assert np.isnan(few.pixels).all()  # of a twentieth of the frames it makes none
     errors[16:] = np.inf
-    found, _ = finished(views, CameraMotion(maps, errors), ())
+    found, _ = finished(views, CameraMotion(maps, errors), (), np.arange(20.0))
     assert np.isfinite(found.pixels[:, 0]).sum() == 16
     (doubt,) = found.warnings
     assert doubt.startswith("in 4 frames of 20 the target is seen")
@@ -366,7 +366,7 @@ def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
 )
 def test_an_outline_that_changes_from_frame_to_frame_is_told(part, told):
     areas = 1e4 * np.random.default_rng(0).uniform(part, 1, 40)
-    found, _ = finished(along(40, areas, 50.0), at_rest(40), ())
+    found, _ = finished(along(40, areas, 50.0), at_rest(40), (), np.arange(40.0))
     assert [doubt[: len(start)] for doubt, start in zip(found.warnings, told, strict=True)] == told
     assert (np.median(found.confidence) < np.exp(-2 / 3)) == bool(told)
 

@@ -195,8 +195,7 @@ class Curve:
         """
         seen, _ = self._seen
         back, on = (np.clip(frames + step, seen[0], seen[-1]) for step in (-1, 1))
-        width = np.maximum(on - back, 1)[..., None]
-        return (self._spline(on) - self._spline(back)) / width
+        return (self._spline(on) - self._spline(back)) / np.maximum(on - back, 1)[..., None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,8 +340,7 @@ class Clock:
         """That of footage which was put right; the times are those of its first video."""
         times, old, new = self.times, self.frames[0], footage.instants
         if footage.lasting != 1 or not np.array_equal(new, old):
-            step = footage.lasting * np.ptp(times) / np.ptp(old)
-            times = times[0] + step * new
+            times = times[0] + footage.lasting * np.ptp(times) / np.ptp(old) * new
         return Clock(times, footage.rates, footage.clocks)
 
     @classmethod

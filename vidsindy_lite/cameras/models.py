@@ -212,8 +212,7 @@ class Camera(ABC):
     @property
     def table(self) -> dict[str, object]:
         """Its model and plain numbers, under the keys of a rig file; defaults are left out."""
-        plain = type(self) is OrthographicCamera
-        known: dict[str, object] = {} if plain else {"model": self.model}
+        known: dict[str, object] = {} if type(self) is OrthographicCamera else {"model": self.model}
         for part in fields(self):
             value = getattr(self, part.name)
             default = isinstance(value, float) and value == part.default
@@ -408,8 +407,7 @@ def undistorted(points: Floats, coefficients: Floats) -> Floats:
     enough = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 20_000, 1e-14)
     found, seen = np.full(points.shape, np.nan), np.isfinite(points).all(axis=1)
     if seen.any():  # a NaN would be tried to the last iteration, and no points are refused
-        given = points[seen, None]
-        ideal = cv2.undistortPoints(given, np.eye(3), coefficients, criteria=enough)
+        ideal = cv2.undistortPoints(points[seen, None], np.eye(3), coefficients, criteria=enough)
         found[seen] = ideal[:, 0]
     found[~(np.abs(distorted(found, coefficients) - points).max(axis=1) < 1e-7)] = np.nan
     return found

@@ -292,8 +292,7 @@ def _learned(videos: _Videos) -> Lags:
         return _told(videos, drifted(begun))
     loose, sampled = _searched(videos)
     close = [s for s in sampled if score(s) <= max(2 * ALIKE * score(sampled[0]), FINE)]
-    small = sorted(close, key=_moved)
-    chosen = _different(close[:_SHOWN] + small[:_SHOWN])
+    chosen = _different(close[:_SHOWN] + sorted(close, key=_moved)[:_SHOWN])
     every = [videos.fitted(s.footage.lags, loose=loose) for s in chosen]
     found = sorted(_different([f for f in every if f]), key=score)
     if not found:
@@ -314,8 +313,7 @@ def _learned(videos: _Videos) -> Lags:
 
 def _searched(videos: _Videos) -> tuple[bool, list[Adjustment]]:
     """Whether cameras should be loose, and fits to some of the instants, the best first."""
-    found = lag_misses(videos.given, videos.known)
-    promising = [dips(*misses)[:8] or [0.0] for misses in found]
+    promising = [dips(*misses)[:8] or [0.0] for misses in lag_misses(videos.given, videos.known)]
     exact = _climbed(videos, promising, False)
     if not exact or score(exact[0]) <= FINE:
         return False, exact
@@ -470,7 +468,6 @@ def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | No
     names : sequence of str
         What the videos are called.
     """
-    start = given.lags
     with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
         begun = _near(given, rig)
         left = min(map(_worst, begun), default=np.inf)
@@ -488,14 +485,13 @@ def find_mistake(given: Footage, rig: Rig, names: Sequence[str]) -> Mistake | No
         tried = [
             (_worst(fit), fit, what, mended, known)
             for _, best, what, mended, known in sorted(ranked, key=itemgetter(0))[:16]
-            for fit in _fits(mended, known, start, best)
+            for fit in _fits(mended, known, given.lags, best)
         ]
         for now, fit, what, mended, known in sorted(tried, key=itemgetter(0)):
             # Times by which it has to mend the disagreement of all views together.
             if now > GROSS or 3.0 * now >= left:
                 break
-            lags = fit.footage.lags
-            told = learn_lags(mended.tracks, known, mended.rates, lags, mended.clocks)
+            told = learn_lags(mended.tracks, known, mended.rates, fit.footage.lags, mended.clocks)
             if not told.agree or told.residual > 2 * DISAGREEMENT:
                 continue
             if _as_well(given, rig, told):

@@ -70,12 +70,11 @@ def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True) -> Rig:
     if rig.is_measured:
         return rig
     check_views(tracks, rig)
-    starts = sorted(_starts(tracks, rig), key=lambda start: start[0])
     footage, fits = Footage.of(tracks), []
     parallel = _left(footage, np.zeros(len(tracks)), range(len(tracks)), 3)
     # These must be worse by a chi-square of 25.
     most = min(GROSS, parallel * float(np.exp(-12.5 / np.isfinite(tracks[0]).sum())))
-    for _, cameras in starts[:4]:
+    for _, cameras in sorted(_starts(tracks, rig), key=lambda start: start[0])[:4]:
         # Known are the place of the first camera, and of all others only their lenses.
         errors = np.array([known_to(camera) for camera in cameras])
         for part in ("normal", "angle", "position"):
@@ -337,8 +336,7 @@ def _promising(footage: Footage, i: int, rank: int) -> list[float]:
     """Whole lags of a view at which less is left than at their neighbours, the best first."""
     lengths = footage.lengths
     tried = np.arange(np.ceil(_least(footage) - lengths[i]), lengths[0] - _least(footage) + 1)
-    every = np.zeros((len(tried), len(lengths)))
-    every[:, i] = tried
+    every = np.outer(tried, np.eye(len(lengths))[i])
     return dips(tried, np.array([_left(footage, lags, (0, i), rank) for lags in every]))
 
 
@@ -351,8 +349,7 @@ def _polished(footage: Footage, lags: Floats, rank: int) -> tuple[Floats, Floats
     count = len(lags)
 
     def beyond(others: Floats) -> Floats:
-        late = np.append(0.0, others)
-        return _beyond(_images(footage, late, range(count)), rank)
+        return _beyond(_images(footage, np.append(0.0, others), range(count)), rank)
 
     found = least_squares(lambda others: np.nan_to_num(beyond(others)).ravel(), lags[1:],
                           diff_step=1e-3, max_nfev=_STEPS)  # fmt: skip

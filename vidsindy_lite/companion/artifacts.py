@@ -166,13 +166,12 @@ def save_slider(
         raise ValueError(f"figures: slider {slider_id!r} needs at least one figure, got none")
     save_figure(slider_id, next(iter(figures.values())), caption=caption, numbers=numbers)
     with plt.rc_context({"savefig.dpi": 100}):
-        frames = [
-            Image.open(io.BytesIO(_png(figure))).convert("RGB") for figure in figures.values()
-        ]
+        pictures = [Image.open(io.BytesIO(_png(figure))) for figure in figures.values()]
     for figure in figures.values():
         plt.close(figure)
-    (width, height), strip = frames[0].size, io.BytesIO()
-    Image.fromarray(np.concatenate([np.asarray(frame) for frame in frames])).save(strip, "PNG")
+    (width, height), strip = pictures[0].size, io.BytesIO()
+    frames = [np.asarray(picture.convert("RGB")) for picture in pictures]
+    Image.fromarray(np.concatenate(frames)).save(strip, "PNG")
     shown = {"labels": list(figures), "caption": caption, "strip": with_palette(strip.getvalue())}
     return HTML(page("slider.html", width=width, height=height, **shown))
 

@@ -123,9 +123,7 @@ def outdated(committed: Path, regenerated: Path, notebook: str) -> list[str]:
             raise ValueError(f"{name}: belongs to notebook {old[name]['notebook']}")
     gone = [name for name in old if old[name]["notebook"] == notebook and name not in new]
     return gone + [
-        name
-        for name in new
-        if name not in old or not _same(old[name], new[name], committed, regenerated)
+        name for name in new if not _same(old.get(name, {}), new[name], committed, regenerated)
     ]
 
 

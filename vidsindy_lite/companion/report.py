@@ -19,7 +19,6 @@ import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from string import ascii_lowercase
@@ -250,7 +249,6 @@ def summary(found: VideoDiscovery, paths: Videos, options: Options = None) -> di
     names = _names(paths, len(found.rig.cameras))
     rates = found.lags.rates / np.median(np.diff(found.t))
     for i, camera in enumerate(found.rig.cameras):
-        seen = np.isfinite(found.tracks[i]).all(axis=1)
         known = VideoInfo(len(found.tracks[i]), float(rates[i]), camera.image_size)
         shot = known if paths is None else video_info(paths[i])
         length = np.linalg.norm(missed[i].reshape(-1, 2), axis=1)
@@ -260,7 +258,7 @@ def summary(found: VideoDiscovery, paths: Videos, options: Options = None) -> di
             **_parts(camera, "model", "position", "normal", "scale", "scale_error", "angle",
                      "homography"),
             "lag": found.lags.frames[i], "lag_error": found.lags.errors[i],
-            "share_of_frames_seen": seen.mean(),
+            "share_of_frames_seen": np.isfinite(found.tracks[i]).all(axis=1).mean(),
             "residual_rms": np.sqrt(np.mean(length**2)) if len(length) else np.nan,
             "residual_of_nine_in_ten": np.quantile(length, 0.9) if len(length) else np.nan,
         })  # fmt: skip
@@ -337,10 +335,8 @@ def _figures(found: VideoDiscovery, paths: Videos) -> Iterator[tuple[str, bytes]
     d = 3 if np.nan_to_num(x)[:, 2].any() else 2  # in the plane of one camera
     curves = {"reconstructed": x[:, :d]}
     curves["curve that obeys the law"] = stacked(found.fitted, 3)[:, :d]
-    draw = plot_path
-    if isinstance(found, PlaneDiscovery):
-        draw = partial(plot_path, unit="s", length=found.unit)
-    yield "path", _picture(draw, t, curves, "not seen")
+    units = {"unit": "s", "length": found.unit} if isinstance(found, PlaneDiscovery) else {}
+    yield "path", _picture(plot_path, t, curves, "not seen", **units)
     seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
     if seen.any() and paths is not None:
         instant = int(seen.argmax())
@@ -370,14 +366,14 @@ def _look(
     return plot_frames(images, titles, tracks, index)
 
 
-def _picture(plot: Callable[..., Figure], *shown: object) -> bytes:
+def _picture(plot: Callable[..., Figure], *shown: object, **how: object) -> bytes:
     """What a function plots, as a PNG."""
     # The first use of pyplot switches the figures of a notebook on, the end of a style whatever was
     # switched on meanwhile off again: so this comes first.
     plt.draw_if_interactive()
     image = io.BytesIO()
     with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
-        figure = plot(*shown)
+        figure = plot(*shown, **how)
         figure.savefig(image, format="png", dpi=110)
         plt.close(figure)
     return image.getvalue()

@@ -21,12 +21,5 @@ from .rendering import BACKGROUNDS, SHAPES, Scene, render, render_labelled, rend
 from .rendering import render_video
 from .track_files import TrackFile, read_tracks
 from .tracking import WEIGHTS, LearnedDetector, check_detector, detections, track
-from .video import (
-    VideoInfo,
-    frame_clock,
-    pick_frames,
-    read_frame,
-    read_video,
-    video_info,
-    write_video,
-)
+from .video import VideoInfo, frame_clock, pick_frames, read_frame, read_video, video_info
+from .video import write_video

@@ -120,11 +120,10 @@ def align(before: Look, after: Look, guess: Floats) -> Aligned | None:
     found = Aligned(_as_similarity(guess, size), np.inf)
     for level in range(len(before.levels), 0, -1):
         scale, back = (np.diag([x, x, 1.0]) for x in (0.5**level, 2.0**level))
-        here = scale @ found.map @ back
         # Grey levels from which on a pixel is left aside.
         loose = 40.0 if level > 1 else 0.0
         both = before.slopes[level - 1], after.levels[level - 1]
-        fitted = _fit(*both, here, scale[0, 0], loose)
+        fitted = _fit(*both, scale @ found.map @ back, scale[0, 0], loose)
         if fitted is None:
             return None
         found = Aligned(back @ fitted.map @ scale, 2 * fitted.error)
@@ -158,15 +157,13 @@ def _fit(
     fair = np.minimum(1, 4.0 * np.median(power) / np.maximum(power, 1e-9))
     share = cv2.resize(fair, (width, height), interpolation=cv2.INTER_LINEAR)
     middle = np.array([[1, 0, (width - 1) / 2], [0, 1, (height - 1) / 2], [0, 0, 1.0]])
-    to_middle = np.linalg.inv(middle)
     steep = slopes.reshape(6, -1)
     # What the guess may be wrong by: shift, turn and scale, gain and offset of the light.
     sure = np.array([scale * _STEP, scale * _STEP, 0.03, 0.03, 1, 100])
     prior = np.diag(1 / sure**2)
     gain, offset = 1.0, 0.0
-    framed = np.full_like(view, _BEYOND)
-    inner = np.s_[2:-2, 2:-2]  # the rim depends on what lies beyond the image
-    framed[inner] = view[inner]
+    # The rim depends on what lies beyond the image.
+    framed = np.pad(view[2:-2, 2:-2], 2, constant_values=_BEYOND)
     within = framed >= 0
     for step in range(6):
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -187,7 +184,7 @@ def _fit(
         normal = heavy @ steep.T + spread**2 * prior
         delta = np.linalg.solve(normal, heavy @ miss.ravel())
         step_map = _similarity(1 + delta[2], delta[3], delta[0], delta[1])
-        here = here @ middle @ np.linalg.inv(step_map) @ to_middle
+        here = here @ middle @ np.linalg.inv(step_map) @ np.linalg.inv(middle)
         gain, offset = float(gain + delta[4]), float(offset + delta[5])
         # Pixels of a level of a step that is no longer worth another.
         if np.hypot(delta[0], delta[1]) + np.hypot(delta[2], delta[3]) * width / 2 < 0.01:
@@ -210,8 +207,7 @@ def _fit(
 
 def _by_blocks(values: Floats32) -> Floats32:
     """The means (12, 12) of an image over its blocks."""
-    blocks = cv2.resize(values, (PARTS, PARTS), interpolation=cv2.INTER_AREA)
-    return np.asarray(blocks, np.float32)
+    return np.asarray(cv2.resize(values, (PARTS, PARTS), interpolation=cv2.INTER_AREA), np.float32)
 
 
 def _slopes(view: Floats32) -> Floats32:
@@ -368,26 +364,25 @@ def steadied(frames: Iterable[Image], factor: int) -> CameraMotion:
     looks = map(Look, frames)
     last = np.eye(3)
     key = before = _Key(next(looks), last, 0.0)
-    maps, errors = [key.base], [key.error]
+    places = [(key.base, key.error)]
     for look in looks:
         if (located := key.locate(look, last)) is None:
             # Little in common with the key frame: more with the last one known.
             key, last = before, np.eye(3)
             located = key.locate(look, last)
         if located is None:
-            maps.append(maps[-1])
-            errors.append(np.inf)
+            places.append((places[-1][0], np.inf))
             continue
         last = located.map
         error = float(np.hypot(key.error, located.error))
         before = _Key(look, key.base @ np.linalg.inv(last), error)
-        maps.append(before.base)
-        errors.append(error)
+        places.append((before.base, error))
         # Share of a key frame that is left, below which there must be a new one. Each adds its
         # error to all that follow, so late: a little above the 0.3 that `align` needs.
         if key.shared(last) < 0.4:
             key, last = before, np.eye(3)
-    return CameraMotion(rescaled(np.array(maps), 1 / factor), factor * np.array(errors))
+    maps, errors = map(np.array, zip(*places, strict=True))
+    return CameraMotion(rescaled(maps, 1 / factor), factor * errors)
 
 
 def explains(samples: Image, maps: Floats) -> bool:

@@ -206,8 +206,7 @@ class Candidates(NamedTuple):
 
     def only(self, rows: Ints | Bools | slice) -> Self:
         """Some of the rows."""
-        columns: list[Any] = [column[rows] for column in self]
-        return type(self)(*columns)
+        return type(self)._make(column[rows] for column in self)
 
     @classmethod
     def joined(cls, parts: Iterable[Candidates]) -> Candidates:
@@ -217,9 +216,8 @@ class Candidates(NamedTuple):
 
 
 def candidates(
-    frames: Iterable[Image], maps: Floats, plate: Plate, noise: float, targets: int,
-    bare: bool = False,
-) -> tuple[Candidates, list[Floats32]]:  # fmt: skip
+    frames: Iterable[Image], maps: Floats, plate: Plate, noise: float, targets: int, bare: bool
+) -> tuple[Candidates, list[Floats32]]:
     """The candidates of all frames, and how much brighter each frame is than the ground.
 
     If `bare`, without the strings on which they hang.
@@ -289,9 +287,8 @@ def without_strings(mask: NDArray[Any]) -> Image:
 
 
 def components(
-    strength: Floats32, level: float, frame: Image, ground: Image, worth: float = 1.0,
-    bare: bool = False,
-) -> Candidates:  # fmt: skip
+    strength: Floats32, level: float, frame: Image, ground: Image, worth: float, bare: bool
+) -> Candidates:
     """What differs by some level and is connected, in a frame that counts as the first one.
 
     A thing is plain if it differs by much, fills its box, is of more than a few pixels and lies
@@ -344,9 +341,7 @@ def _distinct(found: Candidates) -> Candidates:
     for k in range(len(same)):
         if not same[k, kept].any():
             kept.append(k)
-        if len(kept) == _KEPT:
-            break
-    return found.only(np.array(kept, int))
+    return found.only(np.array(kept[:_KEPT], int))
 
 
 def _uncommon(found: Candidates, targets: int) -> Candidates:
@@ -458,8 +453,7 @@ def plainest_paths(seen: Candidates, most: int = 3, *, away: bool = False) -> li
         box, own = box[seen.frame[left]], seen.box[left]
         apart = np.abs(box[:, :2] + box[:, 2:] / 2 - own[:, :2] - own[:, 2:] / 2)
         with np.errstate(invalid="ignore"):
-            part = (apart <= np.maximum(box[:, 2:], own[:, 2:]) / 2 + 1).all(axis=1)
-        left = left[~part]
+            left = left[~(apart <= np.maximum(box[:, 2:], own[:, 2:]) / 2 + 1).all(axis=1)]
     return sorted(found, key=lambda path: -path.rating)
 
 
@@ -501,8 +495,7 @@ class Appearance:
         t = np.arange(_SIDE) - _SIDE // 2
         peak = np.exp(-(t[:, None] ** 2 + t**2) / (2 * (_SIDE / _WIDE / 12) ** 2))
         self._aim = np.fft.rfft2(np.fft.ifftshift(peak))
-        self._own = self._around = np.zeros(_BINS)
-        self._cross, self._power = np.zeros(1), np.zeros(1)
+        self._cross = self._power = self._own = self._around = np.zeros(1)
         self.learn(frame, centre, size, 1.0)
 
     def learn(self, frame: Image, centre: Floats, size: Floats, rate: float) -> None:

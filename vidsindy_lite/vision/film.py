@@ -125,13 +125,12 @@ class Film(NamedTuple):
         """The ground, without what is in boxes (n, 4) of the frames, and the noise of a pixel."""
         samples, maps = (self.samples, self.motion.maps) if whole else (self.small, self.maps)
         here, known = maps[self.sampled], np.isfinite(self.motion.errors[self.sampled])
-        hide = None if boxes is None else boxes[self.sampled]
-        if hide is not None:  # in the others it may be anywhere
-            known &= np.isfinite(hide[:, 0])
+        if boxes is not None:  # in the others it may be anywhere
+            known &= np.isfinite(boxes[self.sampled, 0])
         use = np.flatnonzero(known)
+        hide = None if boxes is None else boxes[self.sampled[use]]
         # The samples are views: copies would fill the memory.
-        plate = Plate([samples[i] for i in use], here[use], hide if hide is None else hide[use],
-                      self.lights[use])  # fmt: skip
+        plate = Plate([samples[i] for i in use], here[use], hide, self.lights[use])
         return plate, noise_of(samples, here, plate)
 
 
@@ -186,8 +185,7 @@ def follow(path: str | os.PathLike, hint: Hint | None = None, *, rests: bool = F
         doubts += (_LOOKS_ALONE,)
     views = viewed(film, lens_of(film, ways), ways, lights)
     if hint is not None and hint.colour is not None and any(views):
-        colour = np.median([view.colour for view in views if view], axis=0)
-        doubts += hint.unlike(colour)
+        doubts += hint.unlike(np.median([view.colour for view in views if view], axis=0))
     found, bound = finished(views, film.motion, doubts, frame_clock(path))
     found = _filled(found, bound, film, ways, both.frame[rows], seed)
     found = replace(found, warnings=found.warnings + unsure(found))
@@ -439,17 +437,14 @@ def expected(seen: Candidates, rows: Ints, film: Film, n: int) -> Ways:
 
 
 def finished(
-    views: list[View | None],
-    motion: CameraMotion,
-    doubts: tuple[str, ...],
-    clock: Floats | None = None,
+    views: list[View | None], motion: CameraMotion, doubts: tuple[str, ...], clock: Floats
 ) -> tuple[Track, float]:
     """The views of the whole target as a track, and by how many pixels they may be off at most.
 
-    By default the frames are evenly spaced; see `frame_clock`.
+    Frames of which the clock says nothing are evenly spaced; see `frame_clock`.
     """
     n = len(views)
-    clock = np.arange(n, dtype=float) if clock is None or len(clock) < n else clock
+    clock = np.arange(n, dtype=float) if len(clock) < n else clock
     pixels, errors = np.full((n, 2), np.nan), np.full(n, np.inf)
     whole, of_parts = entire(views)
     at = np.array([i for i, view in enumerate(whole) if view], int)
@@ -556,7 +551,6 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
     worth = [path.rating / len(path.rows) for path in paths]
     plain = [path for path, own in zip(paths, worth, strict=True) if own >= 0.4 * worth[0]]
     ways = [expected(seen, path.rows, film, n) for path in plain[:count]]
-    touching = _touching(ways)
     doubts: tuple[str, ...] = ()
     # Share of the frames in which one more thing moves, above which there is doubt.
     if len(plain) > count and len(plain[count].rows) >= 0.2 * n:
@@ -564,7 +558,7 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
                   f"{_example(film, seen, plain[count])}",)  # fmt: skip
     lens = lens_of(film, *ways)
     tracks, clock = [], frame_clock(path)
-    for way, met in zip(ways, touching, strict=True):
+    for way, met in zip(ways, _touching(ways), strict=True):
         way.centre[met] = np.nan
         views = viewed(film, lens, way, lights)
         tracks.append(finished(views, film.motion, doubts, clock)[0])

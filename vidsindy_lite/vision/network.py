@@ -110,8 +110,7 @@ def anchors(rows: int, columns: int) -> torch.Tensor:
 
 def as_input(images: Image) -> torch.Tensor:
     """Images (b, height, width, 3) uint8 as what the network takes."""
-    colours = np.ascontiguousarray(images)
-    planes = torch.from_numpy(colours).permute(0, 3, 1, 2)
+    planes = torch.from_numpy(np.ascontiguousarray(images)).permute(0, 3, 1, 2)
     return planes.float().div_(255)  # permuted, the channels stay last in memory: the fast order
 
 

@@ -152,13 +152,9 @@ class Plate:
         if never.any():
             self.image = np.asarray(cv2.inpaint(self.image, never, 3, cv2.INPAINT_TELEA), np.uint8)
 
-    def laid(
-        self, image: NDArray, here: Floats, low: Ints | None = None, high: Ints | None = None,
-        **how: Any,
-    ) -> NDArray:  # fmt: skip
+    def laid(self, image: NDArray, here: Floats, *window: Ints, **how: Any) -> NDArray:
         """An image over the plate in the frame that the map carries, or in a window of that."""
-        left, top = np.zeros(2, int) if low is None else low
-        right, bottom = self.size if high is None else high
+        (left, top), (right, bottom) = window or (np.zeros(2, int), self.size)
         back = np.linalg.inv(self.shift @ here)
         if np.array_equal(back, np.eye(3)):
             return image[top:bottom, left:right]

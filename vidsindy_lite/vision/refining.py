@@ -123,8 +123,7 @@ class Lens:
         """Centroid, area and skewness of one connected part."""
         near = cv2.dilate(label.astype(np.uint8), _CORE) > 0
         core = cv2.erode(label.astype(np.uint8), _CORE) > 0
-        square = dot(contrast, contrast)
-        alpha = dot(change, contrast) / np.maximum(square, self.least**2)
+        alpha = dot(change, contrast) / np.maximum(dot(contrast, contrast), self.least**2)
         alpha = np.clip(alpha, 0, 1)
         alpha[core] = 1
         alpha[~near] = 0
@@ -183,8 +182,7 @@ def entire(views: Sequence[View | None]) -> tuple[list[View | None], tuple[str, 
     areas = np.array([[one.area, all_.area] for one, all_ in both]).reshape(-1, 2)
     offset = np.array([one.centroid - all_.centroid for one, all_ in both]).reshape(-1, 2)
     offset = (offset / np.sqrt(areas[:, 1:] / np.pi))[areas[:, 0] > 0]
-    count = sum(one is not None for one in views)
-    if not len(offset) or len(both) < _MOSTLY * count:
+    if not len(offset) or len(both) < _MOSTLY * sum(one is not None for one in views):
         return parts, ()
     # Of its radius, by which the middle of one colour goes about that of the whole.
     turns = np.linalg.norm(offset - np.median(offset, axis=0), axis=1).mean() > 0.1

@@ -77,8 +77,7 @@ def _sky(rng: np.random.Generator, size: Size) -> Image:
     width, height = size
     row = np.linspace(0, 1, height, dtype=np.float32)[:, None]
     clouds = np.clip(_texture(rng, size, (3, 6, 12, 24), stretch=(1, 2)) * 2.2 - 1.0, 0, 1)
-    light = 150 + 45 * row + 25 * clouds
-    return _paint(light, 48 - 34 * row, -40 + 28 * row)
+    return _paint(150 + 45 * row + 25 * clouds, 48 - 34 * row, -40 + 28 * row)
 
 
 def _hills(rng: np.random.Generator, size: Size) -> Image:

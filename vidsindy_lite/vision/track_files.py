@@ -316,8 +316,7 @@ def _number(cell: str) -> float | None:
 
 def _is_read(name: str) -> bool:
     """Whether something is made of a column."""
-    known = any(one.fullmatch(name) for one in (_TIME, *_SERIES))
-    return known or name in _READ
+    return name in _READ or any(one.fullmatch(name) for one in (_TIME, *_SERIES))
 
 
 def _column(names: Sequence[str], keys: Sequence[str]) -> int | None:
@@ -429,8 +428,7 @@ def _track(
     Those of the world of a program may have any origin and unit.
     """
     doubts: tuple[str, ...] = ()
-    boxes = (box for box in (*_SIZED, *_OPPOSITE) if {*box[0], *box[1]} <= columns.keys())
-    box = next(boxes, None)
+    box = next((box for box in (*_SIZED, *_OPPOSITE) if {*box[0], *box[1]} <= columns.keys()), None)
     pair = next((pair for pair in _PIXELS if set(pair) <= columns.keys()), None)
     if box:
         low, high = (np.array([columns[key] for key in keys]) for keys in box)
@@ -533,9 +531,8 @@ def _unrounded(t: Floats) -> Floats:
 
 def _counts(frames: Floats) -> bool:
     """Whether these are numbers of frames."""
-    if not np.isfinite(frames).all() or (frames != np.rint(frames)).any():
-        return False
-    return bool((np.diff(frames) > 0).all() and np.ptp(frames) < 10_000_000)
+    whole, rises = (frames % 1 == 0).all(), (np.diff(frames) > 0).all()
+    return bool(whole and rises and np.ptp(frames) < 10_000_000)
 
 
 def _is_of_tracker(header: list[list[str]]) -> bool:

@@ -98,8 +98,7 @@ def track(
         lacking += (f"nothing was found of the colour {as_written(target.colour)} as told",)
     if len(found.pixels) != stated:
         lacking += (f"{len(found.pixels)} of its {stated} frames can be read: it is cut off",)
-    doubts = tuple(f"{Path(path).name}: {doubt}" for doubt in lacking)
-    return replace(found, warnings=doubts)
+    return replace(found, warnings=tuple(f"{Path(path).name}: {doubt}" for doubt in lacking))
 
 
 def _lost(found: Track) -> tuple[str, ...]:

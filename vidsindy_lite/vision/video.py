@@ -341,8 +341,7 @@ def _encode(
         with av.open(str(partial.absolute()), "w") as container:
             for frame in _checked(frames):
                 stream = stream or _add_stream(container, codec, rate, frame.shape[1::-1])
-                given = av.VideoFrame.from_ndarray(_turned(frame), "bgr24")
-                container.mux(stream.encode(given))
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(_turned(frame), "bgr24")))
                 count += 1
             if stream is None:
                 raise ValueError("frames: at least one frame is needed, got none")
