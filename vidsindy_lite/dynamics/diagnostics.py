@@ -703,7 +703,7 @@ def _late(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
     seen = np.flatnonzero(collocation.counts[: problem.measured[0][1].shape[1]]).tolist()
     if problem.has_process_noise or len(seen) < 2:
         return
-    each = zip(fit.splines, collocation.segments, strict=True)
+    each = zip(fit.splines, collocation.grid.segments, strict=True)
     step = typical_step(problem.trajectories) * np.concatenate([c(s.t, 1) for c, s in each])
     columns = np.flatnonzero(state.free())  # of which some are one too many
     costs, present = problem.costs(columns), state.flat()[columns]
@@ -792,7 +792,7 @@ def _sampling(problem: Problem, fit: Fit, law: PolynomialSystem, remedy: str) ->
             f"the motion is taken to have process noise, which {few} cannot tell from a drive or a "
             f"force that nobody named: {'sample faster' if coarse else 'record longer'}, or name it"
         )
-    segments, count = fit.collocation.segments, len(fit.collocation.grid.x)
+    segments, count = fit.collocation.grid.segments, len(fit.collocation.grid.x)
     span = sum(np.ptp(segment.breakpoints) for segment in segments)
     # The curve is smooth where kicks are not: along it, no damping is seen of what they balance.
     kicked = (problem.process_noise * span) ** 2 / count > 4 * x.var(axis=0)

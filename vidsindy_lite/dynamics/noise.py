@@ -37,7 +37,7 @@ def _spread(fit: Fit) -> Floats:
     Of measurements of precision 1; for a coordinate that was never observed, as of the others.
     """
     collocation, seen = fit.collocation, fit.collocation.counts > 0
-    used = fit.state.free().sum() / seen.sum() + len(collocation.segments)
+    used = fit.state.free().sum() / seen.sum() + len(collocation.grid.segments)
     squares = (fit.residual**2 * collocation.precision).sum(axis=0)[seen]
     spread = np.sqrt(squares / np.maximum(collocation.counts[seen] - used, 1.0))
     return spread_to_unseen(spread, seen)
@@ -84,7 +84,7 @@ def time_inflation(fit: Fit) -> float:
     the path, together: at most the root of their number.
     """
     collocation = fit.collocation
-    pairs = zip(fit.splines, collocation.segments, strict=True)
+    pairs = zip(fit.splines, collocation.grid.segments, strict=True)
     slopes = np.concatenate([spline(segment.t, 1) for spline, segment in pairs])
     seen = collocation.counts > 0
     scale = (np.sqrt(collocation.precision) / residual_noise(fit))[:, seen]
@@ -291,7 +291,7 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     """
     segments = [
         Segment.even(s.t, s.x, problem.spacing, s.trajectory, s.kinks)
-        for s in fit.collocation.segments
+        for s in fit.collocation.grid.segments
     ]
     start, free = problem.weighted(problem.collocation(segments), 1.0), _free(problem)
     every = replace(_on_knots(start, fit), active=problem.form.candidates)
@@ -367,12 +367,16 @@ def _balanced(
         state, collocation = fit.state, fit.collocation
         factor, physics = collocation.factor(state)
         solved = cho_solve_banded((factor, True), probes)
-        in_law = ((physics @ probes) * (physics @ solved)).mean(axis=1).reshape(-1, d).sum(axis=0)
-        in_data = _measurements_used(collocation, probes, solved)
+        # What the curve uses up, from random vectors of +-1: Hutchinson's trace.
+        used, in_law = (
+            ((rows @ probes) * (rows @ solved)).mean(axis=1).reshape(-1, d)
+            for rows in (grid.measured, physics)
+        )
+        in_data = (used * collocation.sample_weights).sum(axis=0)
         missed = (collocation.precision * fit.residual**2).sum(axis=0)
         kicked = grid.node_weights @ collocation.physics_residual(state) ** 2
         data = np.maximum(collocation.counts - in_data, 1.0) / np.maximum(missed, LEAST)
-        law = np.maximum(unfitted - in_law, 1.0) / np.maximum(kicked, LEAST)
+        law = np.maximum(unfitted - in_law.sum(axis=0), 1.0) / np.maximum(kicked, LEAST)
         unknown = (collocation.counts > 0) & (not told)
         data = np.where(unknown, data, collocation.data_weights)
         law = np.where(free, law, collocation.physics_weights)
@@ -382,19 +386,6 @@ def _balanced(
         if (np.abs(change) < 0.1).all():
             break
     return collocation.solve(state, tolerance=1.0)
-
-
-def _measurements_used(collocation: Collocation, probes: Floats, solved: Floats) -> Floats:
-    """How many measurements of each coordinate the curve uses up, (d,): Hutchinson's trace.
-
-    From random vectors of +-1, (r d, m), and what the inverse of the normal matrix makes of them.
-    """
-    grid = collocation.grid
-    shape = (len(grid.x), collocation.d, -1)
-    before, after = (
-        (grid.samples @ v.reshape(grid.r, -1)).reshape(shape) for v in (probes, solved)
-    )
-    return ((before * after).mean(axis=2) * collocation.sample_weights).sum(axis=0)
 
 
 def like_kicks(fit: Fit, free: Bools, rng: np.random.Generator) -> float:
@@ -407,10 +398,9 @@ def like_kicks(fit: Fit, free: Bools, rng: np.random.Generator) -> float:
     collocation, grid, d = fit.collocation, fit.collocation.grid, fit.collocation.d
     factor, physics = collocation.factor(fit.state)
     kicks = rng.standard_normal((physics.shape[0], PROBES))
-    errors = rng.standard_normal((len(grid.x), d, PROBES))
-    weighted = np.sqrt(collocation.sample_weights)[:, :, None] * errors
-    pull = (grid.samples.T @ weighted.reshape(len(grid.x), -1)).reshape(grid.r * d, PROBES)
-    pull -= physics.T @ kicks
+    errors = rng.standard_normal((grid.x.size, PROBES))
+    weighted = np.sqrt(collocation.sample_weights).reshape(-1, 1) * errors
+    pull = grid.measured.T @ weighted - physics.T @ kicks
     simulated = kicks + physics @ cho_solve_banded((factor, True), pull)
     root = np.sqrt(grid.node_weights[:, None] * collocation.physics_weights)
     found = _bands((root * collocation.physics_residual(fit.state))[:, :, None])

@@ -348,7 +348,7 @@ def polish(problem: Problem, fit: Fit, history: History, most: int = 16) -> Fit:
     """
     collocation = problem.along(fit.collocation, fit.state)
     fit = problem.weighted(collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
-    columns, coarse = np.flatnonzero(fit.state.free()), fit.collocation.segments
+    columns, coarse = np.flatnonzero(fit.state.free()), fit.collocation.grid.segments
     before, parts = 1, 2
     while before < parts:
         last = fit

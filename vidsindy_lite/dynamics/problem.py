@@ -291,7 +291,7 @@ class Problem:
 def fit_curves(collocation: Collocation, curves: Sequence[Callable[[Floats], Floats]]) -> Floats:
     """Control points, (r, d), of the splines closest to the given curves, one a segment."""
     control = []
-    for segment, curve in zip(collocation.segments, curves, strict=True):
+    for segment, curve in zip(collocation.grid.segments, curves, strict=True):
         dense = segment.refined(4).breakpoints
         # scipy's least squares looks each point up among all knots: long data take minutes.
         rows = basis([segment.knots], np.array([0, len(segment.knots) - WIDTH]), [dense])
