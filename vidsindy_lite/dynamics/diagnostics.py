@@ -468,7 +468,7 @@ def _met(problem: Problem, fit: Fit) -> list[Bools]:
     return found
 
 
-def outliers(trajectories: Sequence[Trajectory], met: Sequence[Bools]) -> list[str]:
+def outliers(trajectories: Sequence[Trajectory], met: Sequence[Bools]) -> Iterator[str]:
     """Samples so far from those around them that they must be errors.
 
     Parameters
@@ -501,13 +501,12 @@ def outliers(trajectories: Sequence[Trajectory], met: Sequence[Bools]) -> list[s
             f"t = {t[row]:g}, x = ({', '.join(f'{v:g}' for v in x[row])})"
             for row in np.flatnonzero(far & ~explained).tolist()
         ]
-    if not found:
-        return []
     more = f" and {len(found) - 3} more" if len(found) > 3 else ""
-    return [
-        f"a sample lies far from those before and after it: {'; '.join(found[:3])}{more}: no "
-        "motion explains that; put NaN in its place"
-    ]
+    if found:
+        yield (
+            f"a sample lies far from those before and after it: {'; '.join(found[:3])}{more}: no "
+            "motion explains that; put NaN in its place"
+        )
 
 
 def differenced(names: Sequence[str], trajectories: Sequence[Trajectory]) -> Iterator[str]:
@@ -600,15 +599,10 @@ def _contested(problem: Problem, state: State, path: Path, remedy: str) -> Itera
     law, varies = problem.law(state), path.fit.collocation.systematic.std(axis=0)
     largest = np.inf if path.level > path.lowest else np.sqrt((varies**2).sum(axis=1)).max()
     for own, plateaus in zip(path.of(state.active), path.plateaus, strict=True):
-        near = [plateau for plateau in plateaus if plateau.low <= path.level]
-        same = [plateau for plateau in near if (plateau.terms == own.terms).all()]
+        same = [p for p in plateaus if p.low <= path.level and (p.terms == own.terms).all()]
         own = max(same, key=path.width, default=own)
-        others = [
-            plateau
-            for plateau in plateaus
-            if (plateau.terms != own.terms).any()
-            and (plateau in near or (same and plateau.low < largest))
-        ]
+        limit = max(path.level, largest) if same else path.level
+        others = [p for p in plateaus if p.low <= limit and (p.terms != own.terms).any()]
         rival = max(others, key=path.width, default=None)
         if rival and path.width(rival) > 0.5 * path.width(own):
             change = ", ".join(

@@ -289,10 +289,7 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     rng : Generator
         For the probes of traces.
     """
-    segments = [
-        Segment.even(s.t, s.x, problem.spacing, s.trajectory, s.kinks)
-        for s in fit.collocation.grid.segments
-    ]
+    segments = problem.segments()
     start, free = problem.weighted(problem.collocation(segments), 1.0), _free(problem)
     every = replace(_on_knots(start, fit), active=problem.form.candidates)
     # What is known of a law (the slope of a position is the velocity) holds exactly.
