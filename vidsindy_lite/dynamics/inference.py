@@ -219,9 +219,9 @@ def _pruned(
     def moved(point: Floats) -> tuple[Floats, Floats]:
         return _shifted(exponents, point[:size].reshape(shape).T, point[size:])
 
-    (flat, slopes), original = moved(native), None
-    dead = flat == 0
+    dead, original = moved(native)[0] == 0, None
     for _ in range(size + 1):
+        flat, slopes = moved(native)
         left = slopes[:, free] @ covariance[np.ix_(free, free)] @ slopes[:, free].T
         variance = np.diag(left)
         original = variance if original is None else original
@@ -247,7 +247,6 @@ def _pruned(
                 break
         covariance = covariance - np.outer(pull, pull / room)
         native = point
-        flat, slopes = moved(native)
     flat = np.where(dead, 0.0, flat)
     left[dead] = left[:, dead] = 0.0
     return flat.reshape(shape).T, left

@@ -274,9 +274,7 @@ class PolynomialSystem:
             raise ValueError("coefficients: must be finite, got NaN or infinity")
         for array in (exponents, coefficients):
             array.setflags(write=False)
-        checked = {"names": names, "exponents": exponents, "coefficients": coefficients}
-        for name, value in checked.items():
-            object.__setattr__(self, name, value)
+        vars(self).update(names=names, exponents=exponents, coefficients=coefficients)
 
     @classmethod
     def from_terms(

@@ -15,7 +15,6 @@ from scipy.linalg import cho_solve_banded, toeplitz
 from scipy.special import ndtr
 
 from ..arrays import Bools, Floats
-from .bspline import Segment
 from .collocation import CLEANEST, Collocation, Fit, State, Status
 from .data import CHANCE, autocovariances, inflation
 from .l0 import LEAST, RIDGE
@@ -289,8 +288,7 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     rng : Generator
         For the probes of traces.
     """
-    segments = problem.segments()
-    start, free = problem.weighted(problem.collocation(segments), 1.0), _free(problem)
+    start, free = problem.weighted(problem.collocation(problem.segments()), 1.0), _free(problem)
     every = replace(_on_knots(start, fit), active=problem.form.candidates)
     # What is known of a law (the slope of a position is the velocity) holds exactly.
     physics = np.where(free, 1.0, FINAL_WEIGHT) * start.physics_weights
@@ -298,7 +296,7 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     met = np.isfinite(kicked.collocation.objective(kicked.state))  # else it has a pole on its path
     if not met or like_kicks(kicked, free, rng) < 0.01:
         return None
-    exact = _measured_badly(problem, fit, segments)
+    exact = _measured_badly(problem, fit, start)
     if not evidence(kicked) < evidence(exact) + prediction_gain(exact).sum():
         return None
     return _with_variances(problem, kicked.collocation)
@@ -332,9 +330,9 @@ def evidence(fit: Fit) -> float:
     return float(collocation.objective(fit.state) - weights + 2 * np.log(factor[0]).sum())
 
 
-def _measured_badly(problem: Problem, fit: Fit, segments: list[Segment]) -> Fit:
+def _measured_badly(problem: Problem, fit: Fit, start: Collocation) -> Fit:
     """The exact law on other knots, at the errors that it leaves."""
-    grid = problem.collocation(segments, residual_noise(fit))
+    grid = replace(start, data_weights=residual_noise(fit) ** -2)
     exact = problem.weighted(grid, FINAL_WEIGHT).solve(_on_knots(grid, fit))
     own = replace(exact.collocation, data_weights=residual_noise(exact) ** -2)
     return own.solve(exact.state)

@@ -330,12 +330,9 @@ def refit(problem: Problem, path: Path, history: History) -> Fit | None:
 
 def _restricted(path: Path, active: Bools) -> State:
     """The state that the quadratic model around a fit promises for other terms, (l, d)."""
-    model, state = path.model, path.fit.state
-    support = np.append(active.T.ravel(), state.moving)[model.columns]
-    present = state.flat()[model.columns]
-    solution = minimiser(model.information, model.gradient, present, support)
-    flat = state.flat()
-    flat[model.columns] = solution
+    model, state, columns = path.model, path.fit.state, path.model.columns
+    support, flat = np.append(active.T.ravel(), state.moving)[columns], state.flat()
+    flat[columns] = minimiser(model.information, model.gradient, flat[columns], support)
     return state.moved(state.control_points, flat).of_terms(active)
 
 
