@@ -264,10 +264,9 @@ class _Body:
         for k in free.tolist():
             step = np.zeros(len(flat))
             step[k] = max(1e-3 * errors[k], 1e-8 * abs(flat[k]))
-            above, below = (
-                rule(replace(self.law, coefficients=moved.reshape(self.law.d, -1).T))
-                for moved in (flat + step, flat - step)
-            )
+            change = step.reshape(self.law.d, -1).T
+            above = rule(replace(self.law, coefficients=self.law.coefficients + change))
+            below = rule(replace(self.law, coefficients=self.law.coefficients - change))
             rates.append({name: (above[name] - below[name]) / (2 * step[k]) for name in value})
         covariance, found = self.covariance[np.ix_(free, free)], {}
         for name in value:

@@ -154,17 +154,16 @@ def bent(fit: Fit, degree: int = 3) -> Fit:
     (n, d), seen = fit.residual.shape, np.flatnonzero(collocation.counts)
     residual = fit.residual * np.sqrt(collocation.precision)
     exponents = monomial_exponents(len(seen), degree)
-    k, sizes = len(exponents), np.zeros(d)
+    k = len(exponents)
     if n < 10 * k:
         return fit
     places = collocation.curve(fit.state.control_points)[:, seen]
     modes = np.linalg.qr(monomials(places, exponents))[0]
     explained = modes @ (modes.T @ residual)
-    for j in seen:
-        left = residual[:, j] - explained[:, j]
-        chance = inflation([left[:, None]])[0] * (left @ left) / (n - k)
-        excess = explained[:, j] @ explained[:, j] - (k + CHANCE * np.sqrt(2 * k)) * chance
-        sizes[j] = np.sqrt(excess) if excess > n * CLEANEST**2 else 0.0
+    left = residual - explained
+    chance = inflation([left]) * (left**2).sum(axis=0) / (n - k)
+    excess = (explained**2).sum(axis=0) - (k + CHANCE * np.sqrt(2 * k)) * chance
+    sizes = np.sqrt(np.where(excess > n * CLEANEST**2, excess, 0.0))
     bends = np.einsum("nk,ij->nijk", modes, np.diag(sizes)[:, sizes > 0]).reshape(n, d, -1)
     shared = np.concatenate([collocation.systematic, bends], axis=2)
     return replace(fit, collocation=replace(collocation, systematic=shared))

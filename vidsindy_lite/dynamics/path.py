@@ -124,9 +124,7 @@ def first_law(problem: Problem, history: History, tolerated: float | None = None
     degrees, implicit = problem.exponents.sum(axis=1), problem.form.implicit
     # Terms of denominators come last: a factor above and below the line changes nothing.
     stages = [~implicit & (degrees <= 2), ~implicit, np.ones_like(implicit)]
-    for k, rows in enumerate(stages):
-        if k and (rows == stages[k - 1]).all():
-            continue
+    for rows in {rows.tobytes(): rows for rows in stages}.values():  # of those alike, one
         whole = unpruned(tolerant, rows)
         history.add("all terms", whole)
         fit = cheapest(tolerant, whole, [(problem.origin, np.zeros(problem.d, dtype=bool))])
