@@ -41,7 +41,7 @@ def test_less_than_a_turn_and_a_half_is_told_of_several_runs_too():
 def far_off(t, x):
     """What is said of samples that no law explains."""
     runs = check_trajectories(t, x)
-    return outliers(runs, [np.zeros(len(times), dtype=bool) for times, _ in runs])
+    return list(outliers(runs, [np.zeros(len(times), dtype=bool) for times, _ in runs]))
 
 
 def test_a_coordinate_that_lost_its_law_is_told(duffing):

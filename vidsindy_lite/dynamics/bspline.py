@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -203,6 +204,11 @@ class Grid:
             node_times=np.concatenate(nodes),
             node_weights=width / width.sum() * len(x),
         )
+
+    @cached_property
+    def measured(self) -> sparse.csr_array:
+        """All control points, one number after the other, to all that was measured, (n d, r d)."""
+        return sparse.kron(self.samples, sparse.eye_array(self.x.shape[1]), format="csr")
 
     @property
     def runs(self) -> Ints:

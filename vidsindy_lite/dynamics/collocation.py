@@ -259,11 +259,6 @@ class Collocation:
         return self.grid.x.shape[1]
 
     @property
-    def segments(self) -> tuple[Segment, ...]:
-        """The stretches of data."""
-        return self.grid.segments
-
-    @property
     def counts(self) -> Ints:
         """How often each coordinate was observed, shape (d,)."""
         return np.count_nonzero(self.precision, axis=0)
@@ -282,18 +277,15 @@ class Collocation:
         return band
 
     @cached_property
-    def _shared(self) -> tuple[Floats, Floats]:
-        """Weighted systematic errors, and the normal matrix of their sizes."""
-        weighted = self.sample_weights[:, :, None] * self.systematic
-        information = np.tensordot(weighted, self.systematic, axes=((0, 1), (0, 1)))
-        return weighted, information + np.eye(len(information))
+    def _shared(self) -> tuple[Floats, Floats, Floats]:
+        """Weighted systematic errors, (n d, k), and the normal matrix of their sizes.
 
-    @cached_property
-    def _pull(self) -> Floats:
-        """How the systematic errors pull at the control points, (r d, k)."""
-        weighted, _ = self._shared
-        pull = self.grid.samples.T @ weighted.reshape(len(self.grid.x), -1)
-        return np.asarray(pull).reshape(self.grid.r * self.d, -1)
+        And how they pull at the control points, (r d, k).
+        """
+        flat = self.systematic.reshape(self.grid.x.size, -1)
+        weighted = self.sample_weights.reshape(-1, 1) * flat
+        information = weighted.T @ flat + np.eye(flat.shape[1])
+        return weighted, information, self.grid.measured.T @ weighted
 
     def curve(self, control_points: Floats) -> Floats:
         """The curve at the samples, shape (n, d)."""
@@ -310,8 +302,8 @@ class Collocation:
         """
         curve = self.curve(control_points)
         residual = np.where(self.precision > 0, curve - self.grid.x, 0.0)
-        weighted, information = self._shared
-        sizes = -np.linalg.solve(information, np.einsum("nik,ni->k", weighted, residual))
+        weighted, information, _ = self._shared
+        sizes = -np.linalg.solve(information, np.einsum("sk,s->k", weighted, residual.ravel()))
         return residual + (self.precision > 0) * (self.systematic @ sizes), sizes
 
     def data_loss(self, control_points: Floats) -> float:
@@ -367,8 +359,8 @@ class Collocation:
         factor = self._factor(physics, damping)
 
         response = physics.T @ unknowns
-        response[:, 0] += (self.grid.samples.T @ (data_residual * self.sample_weights)).ravel()
-        response[:, 1 + len(columns) :] = self._pull
+        response[:, 0] += self.grid.measured.T @ (data_residual * self.sample_weights).ravel()
+        response[:, 1 + len(columns) :] = self._shared[-1]
         objective = (data_residual**2 * self.sample_weights).sum() + sizes @ sizes
         objective += (unknowns[:, 0] ** 2).sum()
         # A few columns at once: of long data, each copy of all of them is large.
@@ -421,14 +413,9 @@ class Collocation:
         size, count = len(columns), len(term_columns)
         unknowns = np.zeros((len(residual), d, 1 + size + self.systematic.shape[-1]))
         unknowns[:, :, 0] = residual
-        for j in range(d):
-            here = np.flatnonzero(term_columns // l == j)
-            unknowns[:, j, 1 + here] = -root[:, j, None] * terms[:, term_columns[here] % l]
-        sources = state.sources
-        for entry in np.flatnonzero(sources != np.arange(len(sources))).tolist():
-            j, k = divmod(entry, l)
-            place = np.flatnonzero(term_columns == sources[entry])
-            unknowns[:, j, 1 + place] = -root[:, j, None] * terms[:, [k]]
+        for j, sources in enumerate(np.split(state.sources[: d * l], d)):
+            place, row = np.nonzero(term_columns[:, None] == sources)
+            unknowns[:, j, 1 + place] = -root[:, j, None] * terms[:, row]
         unknowns[:, :, 1 + count : 1 + size] = jacobian[:, :, offset_columns]
         return self.grid.physics(root * below, jacobian), unknowns.reshape(-1, unknowns.shape[-1])
 
@@ -438,14 +425,12 @@ class Collocation:
         It is the Schur complement, without the cancellation between two large matrices that a
         large physics weight would bring.
         """
-        gram = left.T @ left
-        follow = self.grid.samples @ solved.reshape(self.grid.r, -1)
-        follow = follow.reshape(-1, self.d, left.shape[1])
-        follow[:, :, 0] += data_residual
-        follow[:, :, left.shape[1] - self.systematic.shape[-1] :] += self.systematic
-        follow *= np.sqrt(self.sample_weights)[:, :, None]
-        follow = follow.reshape(-1, left.shape[1])
-        return np.asarray(gram + follow.T @ follow)
+        follow = self.grid.measured @ solved
+        follow[:, 0] += data_residual.ravel()
+        shared = self.systematic.reshape(len(follow), -1)
+        follow[:, follow.shape[1] - shared.shape[1] :] += shared
+        follow *= np.sqrt(self.sample_weights).reshape(-1, 1)
+        return np.asarray(left.T @ left + follow.T @ follow)
 
     @np.errstate(over="ignore", invalid="ignore")  # of steps that go too far, and are refused
     def solve(self, state: State, tolerance: float = 1e-2, max_steps: int = 30) -> Fit:

@@ -279,9 +279,8 @@ def typical_step(trajectories: Sequence[Trajectory]) -> float:
 def typical_steps(trajectories: Sequence[Trajectory]) -> Floats:
     """The same of each coordinate over that of all samples, (d,): 1 if it is seen in all."""
     coordinates = range(trajectories[0][1].shape[1])
-    times = [[t[np.isfinite(x[:, j])] for t, x in trajectories] for j in coordinates]
-    own = [np.median(np.concatenate([np.diff(t) for t in parts])) for parts in times]
-    return np.array(own) / typical_step(trajectories)
+    seen = [[(t[np.isfinite(x[:, j])], x) for t, x in trajectories] for j in coordinates]
+    return np.array([typical_step(parts) for parts in seen]) / typical_step(trajectories)
 
 
 # --------------------------------------------------------------------------------------------------
@@ -335,15 +334,12 @@ def inflation(pieces: Sequence[Floats]) -> Floats:
         Errors of successive samples, of mean zero.
     """
     covariances = autocovariances(pieces)
-    result = np.ones(covariances.shape[1])
     limit = CHANCE / np.sqrt(max(sum(map(len, pieces)), 1))
-    for j, covariance in enumerate(covariances.T):
-        if covariance[1:].any() and covariance[1] > limit * covariance[0]:
-            even = len(covariance) // 2 * 2
-            pairs = covariance[:even].reshape(-1, 2).sum(axis=1) / covariance[0]
-            positive = len(pairs) if (pairs > 0).all() else int((pairs <= 0).argmax())
-            result[j] = max(2 * pairs[:positive].sum() - 1, 1.0)
-    return result
+    lasting = (covariances[1:2] > limit * covariances[0]).any(axis=0)
+    pairs = covariances[: len(covariances) // 2 * 2].reshape(-1, 2, len(lasting)).sum(axis=1)
+    pairs /= np.where(lasting, covariances[0], 1.0)
+    total = pairs.sum(axis=0, where=np.logical_and.accumulate(pairs > 0))
+    return np.where(lasting, np.maximum(2 * total - 1, 1.0), 1.0)
 
 
 def autocovariances(pieces: Sequence[Floats]) -> Floats:

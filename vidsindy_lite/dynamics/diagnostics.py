@@ -468,7 +468,7 @@ def _met(problem: Problem, fit: Fit) -> list[Bools]:
     return found
 
 
-def outliers(trajectories: Sequence[Trajectory], met: Sequence[Bools]) -> list[str]:
+def outliers(trajectories: Sequence[Trajectory], met: Sequence[Bools]) -> Iterator[str]:
     """Samples so far from those around them that they must be errors.
 
     Parameters
@@ -501,13 +501,12 @@ def outliers(trajectories: Sequence[Trajectory], met: Sequence[Bools]) -> list[s
             f"t = {t[row]:g}, x = ({', '.join(f'{v:g}' for v in x[row])})"
             for row in np.flatnonzero(far & ~explained).tolist()
         ]
-    if not found:
-        return []
     more = f" and {len(found) - 3} more" if len(found) > 3 else ""
-    return [
-        f"a sample lies far from those before and after it: {'; '.join(found[:3])}{more}: no "
-        "motion explains that; put NaN in its place"
-    ]
+    if found:
+        yield (
+            f"a sample lies far from those before and after it: {'; '.join(found[:3])}{more}: no "
+            "motion explains that; put NaN in its place"
+        )
 
 
 def differenced(names: Sequence[str], trajectories: Sequence[Trajectory]) -> Iterator[str]:
@@ -600,15 +599,10 @@ def _contested(problem: Problem, state: State, path: Path, remedy: str) -> Itera
     law, varies = problem.law(state), path.fit.collocation.systematic.std(axis=0)
     largest = np.inf if path.level > path.lowest else np.sqrt((varies**2).sum(axis=1)).max()
     for own, plateaus in zip(path.of(state.active), path.plateaus, strict=True):
-        near = [plateau for plateau in plateaus if plateau.low <= path.level]
-        same = [plateau for plateau in near if (plateau.terms == own.terms).all()]
+        same = [p for p in plateaus if p.low <= path.level and (p.terms == own.terms).all()]
         own = max(same, key=path.width, default=own)
-        others = [
-            plateau
-            for plateau in plateaus
-            if (plateau.terms != own.terms).any()
-            and (plateau in near or (same and plateau.low < largest))
-        ]
+        limit = max(path.level, largest) if same else path.level
+        others = [p for p in plateaus if p.low <= limit and (p.terms != own.terms).any()]
         rival = max(others, key=path.width, default=None)
         if rival and path.width(rival) > 0.5 * path.width(own):
             change = ", ".join(
@@ -703,7 +697,7 @@ def _late(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
     seen = np.flatnonzero(collocation.counts[: problem.measured[0][1].shape[1]]).tolist()
     if problem.has_process_noise or len(seen) < 2:
         return
-    each = zip(fit.splines, collocation.segments, strict=True)
+    each = zip(fit.splines, collocation.grid.segments, strict=True)
     step = typical_step(problem.trajectories) * np.concatenate([c(s.t, 1) for c, s in each])
     columns = np.flatnonzero(state.free())  # of which some are one too many
     costs, present = problem.costs(columns), state.flat()[columns]
@@ -792,7 +786,7 @@ def _sampling(problem: Problem, fit: Fit, law: PolynomialSystem, remedy: str) ->
             f"the motion is taken to have process noise, which {few} cannot tell from a drive or a "
             f"force that nobody named: {'sample faster' if coarse else 'record longer'}, or name it"
         )
-    segments, count = fit.collocation.segments, len(fit.collocation.grid.x)
+    segments, count = fit.collocation.grid.segments, len(fit.collocation.grid.x)
     span = sum(np.ptp(segment.breakpoints) for segment in segments)
     # The curve is smooth where kicks are not: along it, no damping is seen of what they balance.
     kicked = (problem.process_noise * span) ** 2 / count > 4 * x.var(axis=0)

@@ -89,11 +89,6 @@ class Flight:
         return replace(self, left=self.left - (sizes @ bends).reshape(self.left.shape))
 
     @property
-    def force(self) -> Floats:
-        """The constant force, (m,)."""
-        return np.split(self.theta[:-1], 3)[2]
-
-    @property
     def error(self) -> float:
         """Standard deviation of single samples about it."""
         return float(np.sqrt((self.left**2).sum() / max(self.left.size - self.free.sum(), 1)))
@@ -218,7 +213,8 @@ def _doubt(flight: Flight, richer: Flight, penalty: float) -> tuple[str, ...]:
     gained = (flight.left**2).sum() - (richer.left**2).sum()
     if richer is flight or gained < penalty * richer.error**2 * inflation([richer.left]).max():
         return ()
-    pull, left, k = np.linalg.norm(richer.force), richer.error / flight.error, richer.theta[-1]
+    force, k = np.split(richer.theta[:-1], 3)[2], richer.theta[-1]
+    pull, left = np.linalg.norm(force), richer.error / flight.error
     if not k:
         return (f"a constant force of {pull:.4g} would leave {100 * left:.0f} % of the errors",)
     cause = "drag" if k < 0 else "it comes nearer, or the plane lies askew"

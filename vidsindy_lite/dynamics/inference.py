@@ -102,7 +102,7 @@ def infer(
     weighed = _shifted(exponents, coefficients, offset)[0] == coefficients.T.ravel()
     penalties = np.where(weighed, KEPT, np.tile(problem.penalties, problem.d))
     noise = problem.noise if problem.has_process_noise else residual_noise(fit)
-    span = sum(np.ptp(s.breakpoints) for s in collocation.segments) / len(collocation.grid.x)
+    span = sum(np.ptp(s.breakpoints) for s in collocation.grid.segments) / len(collocation.grid.x)
 
     def told(curve: BSpline) -> BSpline:
         return BSpline(curve.t * units.time, curve.c * units.scale + units.centre, DEGREE)
@@ -152,7 +152,7 @@ def across_gaps(problem: Problem, fit: Fit, most: float = 0.1) -> Iterator[BSpli
     way; where that is ``most`` of the spread, or an input jumps nobody knows when, the gap is open.
     """
     law = problem.law(fit.state).shift(fit.state.offset)
-    pieces = zip(fit.collocation.segments, fit.splines, strict=True)
+    pieces = zip(fit.collocation.grid.segments, fit.splines, strict=True)
     for (before, left), (after, right) in pairwise(pieces):
         low, high = left.t[-1], right.t[0]
         jumps = ((problem.unsure[:, 0] < high) & (low < problem.unsure[:, 1])).any()
@@ -219,9 +219,9 @@ def _pruned(
     def moved(point: Floats) -> tuple[Floats, Floats]:
         return _shifted(exponents, point[:size].reshape(shape).T, point[size:])
 
-    (flat, slopes), original = moved(native), None
-    dead = flat == 0
+    dead, original = moved(native)[0] == 0, None
     for _ in range(size + 1):
+        flat, slopes = moved(native)
         left = slopes[:, free] @ covariance[np.ix_(free, free)] @ slopes[:, free].T
         variance = np.diag(left)
         original = variance if original is None else original
@@ -247,7 +247,6 @@ def _pruned(
                 break
         covariance = covariance - np.outer(pull, pull / room)
         native = point
-        flat, slopes = moved(native)
     flat = np.where(dead, 0.0, flat)
     left[dead] = left[:, dead] = 0.0
     return flat.reshape(shape).T, left

@@ -105,23 +105,12 @@ class _Fit:
     All in scaled entries.
     """
 
-    matrix: Floats
     support: Bools
     inside: Ints
     inverse: Floats
     fitted: Floats
     left: Floats
     fall: float
-
-    def newcomers(self) -> tuple[Ints, Floats, Floats]:
-        """Those outside, (k,), how far those inside give way to each, (k, inside), and its room.
-
-        That is the share of it that is no combination of those inside, (k,).
-        """
-        outside = np.flatnonzero(~self.support)
-        shared = self.matrix[outside[:, None], self.inside]
-        response = shared @ self.inverse
-        return outside, response, 1 - (response * shared).sum(axis=1)
 
 
 @dataclass(frozen=True)
@@ -164,7 +153,17 @@ class _Quadratic:
         step[inside] = moved
         left = self.gradient - self.matrix @ step
         fall, fitted = -float(step @ (left + self.gradient)), self.present[inside] + moved
-        return _Fit(self.matrix, support, inside, inverse, fitted, left, fall)
+        return _Fit(support, inside, inverse, fitted, left, fall)
+
+    def newcomers(self, fit: _Fit) -> tuple[Ints, Floats, Floats]:
+        """Those outside, (k,), how far those inside give way to each, (k, inside), and its room.
+
+        That is the share of it that is no combination of those inside, (k,).
+        """
+        outside = np.flatnonzero(~fit.support)
+        shared = self.matrix[outside[:, None], fit.inside]
+        response = shared @ fit.inverse
+        return outside, response, 1 - (response * shared).sum(axis=1)
 
     def solution(self, fit: _Fit) -> Floats:
         """The minimiser, zero outside of the support, in units of its own entries."""
@@ -205,14 +204,13 @@ def _changed(support: Bools, entries: list[int]) -> Bools:
 
 def _best_change(model: _Quadratic, fit: _Fit) -> tuple[float, list[int]]:
     """The best of all drops, adds and swaps: change of the function, and whose places change."""
-    (outside, response, room), spread = fit.newcomers(), fit.inverse.diagonal()
+    (outside, response, room), spread = model.newcomers(fit), fit.inverse.diagonal()
     loss = fit.fitted**2 / spread - model.penalty[fit.inside]
     price = model.penalty[outside]
     # A row for each that joins, the first for none; a column for each that leaves, the same.
-    changes = np.full((1 + len(price), 1 + len(loss)), np.inf)
-    changes[0, 1:] = loss
-    changes[1:, 0] = price - _gain(fit.left[outside], room)
-    changes[1:, 1:] = loss + price[:, None]
+    changes = np.append(0.0, loss) + np.append(0.0, price)[:, None]
+    changes[0, 0] = np.inf
+    changes[1:, 0] -= _gain(fit.left[outside], room)
     # A drop changes what the others leave over, and the room a newcomer has, by rank one.
     left = response * (fit.fitted / spread) + fit.left[outside, None]
     changes[1:, 1:] -= _gain(left, response**2 / spread + room[:, None])
@@ -325,7 +323,7 @@ def far_neighbours(
     law, found, price = model.fit(support), [], penalty - 2 * np.log(model.scale)
     for dropped in (-1, *law.inside.tolist()):
         fit = model.fit(support & (np.arange(len(support)) != dropped))
-        outside, response, room = fit.newcomers()
+        outside, response, room = model.newcomers(fit)
         new = (room > COLLINEAR) & (outside != dropped)  # to add what was dropped is the law itself
         own = fit.fall - np.linalg.slogdet(fit.inverse)[1] + price[fit.inside].sum()
         gained = _gain(fit.left[outside], room)

@@ -107,8 +107,7 @@ class Function:
         """Derivatives at points (n, d), by differences of fourth order, (n, d)."""
         result = np.zeros_like(x)
         for axis in self.axes:
-            step = np.zeros(x.shape[1])
-            step[axis] = 1e-4 * (np.abs(x[:, axis]).mean() or 1.0)
+            step = 1e-4 * (np.abs(x[:, axis]).mean() or 1.0) * np.eye(x.shape[1])[axis]
             near = self.value(x + step) - self.value(x - step)
             far = self.value(x + 2 * step) - self.value(x - 2 * step)
             result[:, axis] = (8 * near - far) / (12 * step[axis])

@@ -262,12 +262,10 @@ class _Body:
         free = np.flatnonzero(errors * flat)
         rates = []
         for k in free.tolist():
-            step = np.zeros(len(flat))
-            step[k] = max(1e-3 * errors[k], 1e-8 * abs(flat[k]))
-            above, below = (
-                rule(replace(self.law, coefficients=moved.reshape(self.law.d, -1).T))
-                for moved in (flat + step, flat - step)
-            )
+            step = max(1e-3 * errors[k], 1e-8 * abs(flat[k])) * (np.arange(len(flat)) == k)
+            change = step.reshape(self.law.d, -1).T
+            above = rule(replace(self.law, coefficients=self.law.coefficients + change))
+            below = rule(replace(self.law, coefficients=self.law.coefficients - change))
             rates.append({name: (above[name] - below[name]) / (2 * step[k]) for name in value})
         covariance, found = self.covariance[np.ix_(free, free)], {}
         for name in value:
@@ -450,8 +448,7 @@ def _swings(stiffness: Floats, damping: Floats, alone: bool) -> NDArray[np.compl
         half = np.diag(damping) / 2
         return -half + 1j * np.sqrt(np.maximum(np.diag(stiffness) - half**2, 0.0))
     pair = np.block([[np.zeros((m, m)), np.eye(m)], [-stiffness, -damping]])
-    rates = np.linalg.eigvals(pair)
-    rates = rates[np.argsort(np.abs(rates))]
+    rates = np.array(sorted(np.linalg.eigvals(pair), key=abs))
     turning, real = rates[rates.imag > 0], rates[rates.imag == 0]  # of two real ones the slower
     both = np.append(turning, real[: m - len(turning)])
     return both[np.argsort(np.abs(both))]

@@ -184,10 +184,8 @@ def _step(rate: Callable[[Floats], Floats], x: Floats, step: float) -> tuple[Flo
         slopes[k] = rate(x + step * np.add.reduce(weights * slopes[:k]))
     moved = x + step * np.add.reduce(WEIGHTS * slopes)
     scale = 1e-11 * (1 + np.maximum(np.abs(x), np.abs(moved)))
-    third, fifth = (
-        float(np.add.reduce((np.add.reduce(weights * slopes) / scale) ** 2))
-        for weights in (THIRD, FIFTH)
-    )
+    third = float(np.add.reduce((np.add.reduce(THIRD * slopes) / scale) ** 2))
+    fifth = float(np.add.reduce((np.add.reduce(FIFTH * slopes) / scale) ** 2))
     if fifth == 0:
         return moved, 0.0
     return moved, step * fifth / np.sqrt((fifth + 0.01 * third) * len(x))
@@ -276,9 +274,7 @@ class PolynomialSystem:
             raise ValueError("coefficients: must be finite, got NaN or infinity")
         for array in (exponents, coefficients):
             array.setflags(write=False)
-        checked = {"names": names, "exponents": exponents, "coefficients": coefficients}
-        for name, value in checked.items():
-            object.__setattr__(self, name, value)
+        vars(self).update(names=names, exponents=exponents, coefficients=coefficients)
 
     @classmethod
     def from_terms(
@@ -526,10 +522,8 @@ class PolynomialSystem:
         before = [np.maximum(one - just, 0) for one in at]
         every = np.unique(np.concatenate([times - t[0], *at, *before]))
         fraction, size = bool(self.implicit.any()), self.d + len(self.functions)
-        above, below = (
-            sums(self.exponents[rows, :size], self.coefficients[rows])
-            for rows in (~self.implicit, self.implicit)
-        )
+        above = sums(self.exponents[~self.implicit, :size], self.coefficients[~self.implicit])
+        below = sums(self.exponents[self.implicit, :size], self.coefficients[self.implicit])
 
         def rate(x: Floats) -> Floats:
             z = extended((x + clock)[None], self.functions)[0]
@@ -589,17 +583,16 @@ class PolynomialSystem:
     def latex(self, digits: int = 4) -> str:
         """The equations as a LaTeX ``aligned`` block (without surrounding dollar signs)."""
         names = tuple(map(name_latex, self.names))
-        left = {j: rf"\dot{{{name}}}" for j, name in enumerate(names)}
+        left = [rf"\dot{{{name}}}" for name in names]
         if self.order == 2:
             m = self.states // 2
-            names = names[:m] + tuple(left[j] for j in range(m)) + names[2 * m :]
-            left |= {m + j: rf"\ddot{{{names[j]}}}" for j in range(m)}
-        left = {j: left[j] for j in self.sides()}
+            names = (*names[:m], *left[:m], *names[2 * m :])
+            left[m : 2 * m] = [rf"\ddot{{{name}}}" for name in names[:m]]
         names += tuple(function.latex for function in self.functions)
         terms = [_term_text(e, names, "{}^{{{}}}", 0) for e in self.exponents]
         rows = (
-            f"{side} &= " + self._right(j, terms, digits, r"\frac{{{}}}{{{}}}", r"\,")
-            for j, side in left.items()
+            f"{left[j]} &= " + self._right(j, terms, digits, r"\frac{{{}}}{{{}}}", r"\,")
+            for j in self.sides()
         )
         return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
 
@@ -624,12 +617,10 @@ def parse_term(term: str, names: tuple[str, ...]) -> tuple[int, ...]:
     rest = "" if term.strip() == "1" else term.replace("**", "^").replace("*", " ").strip()
     longest_first = "|".join(sorted(map(re.escape, names), key=len, reverse=True))
     factor = re.compile(rf"({longest_first})(?:\s*\^\s*(\d+))?\s*")
-    while rest:
-        match = factor.match(rest)
-        if match is None:
-            raise ValueError(f"term: must be a product of the variables {names}, got {term!r}")
-        exponents[match[1]] += int(match[2] or 1)
-        rest = rest[match.end() :]
+    if factor.sub("", rest):
+        raise ValueError(f"term: must be a product of the variables {names}, got {term!r}")
+    for name, power in factor.findall(rest):
+        exponents[name] += int(power or 1)
     return tuple(exponents.values())
 
 

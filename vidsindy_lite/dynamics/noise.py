@@ -15,7 +15,6 @@ from scipy.linalg import cho_solve_banded, toeplitz
 from scipy.special import ndtr
 
 from ..arrays import Bools, Floats
-from .bspline import Segment
 from .collocation import CLEANEST, Collocation, Fit, State, Status
 from .data import CHANCE, autocovariances, inflation
 from .l0 import LEAST, RIDGE
@@ -37,7 +36,7 @@ def _spread(fit: Fit) -> Floats:
     Of measurements of precision 1; for a coordinate that was never observed, as of the others.
     """
     collocation, seen = fit.collocation, fit.collocation.counts > 0
-    used = fit.state.free().sum() / seen.sum() + len(collocation.segments)
+    used = fit.state.free().sum() / seen.sum() + len(collocation.grid.segments)
     squares = (fit.residual**2 * collocation.precision).sum(axis=0)[seen]
     spread = np.sqrt(squares / np.maximum(collocation.counts[seen] - used, 1.0))
     return spread_to_unseen(spread, seen)
@@ -84,7 +83,7 @@ def time_inflation(fit: Fit) -> float:
     the path, together: at most the root of their number.
     """
     collocation = fit.collocation
-    pairs = zip(fit.splines, collocation.segments, strict=True)
+    pairs = zip(fit.splines, collocation.grid.segments, strict=True)
     slopes = np.concatenate([spline(segment.t, 1) for spline, segment in pairs])
     seen = collocation.counts > 0
     scale = (np.sqrt(collocation.precision) / residual_noise(fit))[:, seen]
@@ -155,17 +154,16 @@ def bent(fit: Fit, degree: int = 3) -> Fit:
     (n, d), seen = fit.residual.shape, np.flatnonzero(collocation.counts)
     residual = fit.residual * np.sqrt(collocation.precision)
     exponents = monomial_exponents(len(seen), degree)
-    k, sizes = len(exponents), np.zeros(d)
+    k = len(exponents)
     if n < 10 * k:
         return fit
     places = collocation.curve(fit.state.control_points)[:, seen]
     modes = np.linalg.qr(monomials(places, exponents))[0]
     explained = modes @ (modes.T @ residual)
-    for j in seen:
-        left = residual[:, j] - explained[:, j]
-        chance = inflation([left[:, None]])[0] * (left @ left) / (n - k)
-        excess = explained[:, j] @ explained[:, j] - (k + CHANCE * np.sqrt(2 * k)) * chance
-        sizes[j] = np.sqrt(excess) if excess > n * CLEANEST**2 else 0.0
+    left = residual - explained
+    chance = inflation([left]) * (left**2).sum(axis=0) / (n - k)
+    excess = (explained**2).sum(axis=0) - (k + CHANCE * np.sqrt(2 * k)) * chance
+    sizes = np.sqrt(np.where(excess > n * CLEANEST**2, excess, 0.0))
     bends = np.einsum("nk,ij->nijk", modes, np.diag(sizes)[:, sizes > 0]).reshape(n, d, -1)
     shared = np.concatenate([collocation.systematic, bends], axis=2)
     return replace(fit, collocation=replace(collocation, systematic=shared))
@@ -289,11 +287,7 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     rng : Generator
         For the probes of traces.
     """
-    segments = [
-        Segment.even(s.t, s.x, problem.spacing, s.trajectory, s.kinks)
-        for s in fit.collocation.segments
-    ]
-    start, free = problem.weighted(problem.collocation(segments), 1.0), _free(problem)
+    start, free = problem.weighted(problem.collocation(problem.segments()), 1.0), _free(problem)
     every = replace(_on_knots(start, fit), active=problem.form.candidates)
     # What is known of a law (the slope of a position is the velocity) holds exactly.
     physics = np.where(free, 1.0, FINAL_WEIGHT) * start.physics_weights
@@ -301,7 +295,7 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     met = np.isfinite(kicked.collocation.objective(kicked.state))  # else it has a pole on its path
     if not met or like_kicks(kicked, free, rng) < 0.01:
         return None
-    exact = _measured_badly(problem, fit, segments)
+    exact = _measured_badly(problem, fit, start)
     if not evidence(kicked) < evidence(exact) + prediction_gain(exact).sum():
         return None
     return _with_variances(problem, kicked.collocation)
@@ -335,9 +329,9 @@ def evidence(fit: Fit) -> float:
     return float(collocation.objective(fit.state) - weights + 2 * np.log(factor[0]).sum())
 
 
-def _measured_badly(problem: Problem, fit: Fit, segments: list[Segment]) -> Fit:
+def _measured_badly(problem: Problem, fit: Fit, start: Collocation) -> Fit:
     """The exact law on other knots, at the errors that it leaves."""
-    grid = problem.collocation(segments, residual_noise(fit))
+    grid = replace(start, data_weights=residual_noise(fit) ** -2)
     exact = problem.weighted(grid, FINAL_WEIGHT).solve(_on_knots(grid, fit))
     own = replace(exact.collocation, data_weights=residual_noise(exact) ** -2)
     return own.solve(exact.state)
@@ -367,12 +361,16 @@ def _balanced(
         state, collocation = fit.state, fit.collocation
         factor, physics = collocation.factor(state)
         solved = cho_solve_banded((factor, True), probes)
-        in_law = ((physics @ probes) * (physics @ solved)).mean(axis=1).reshape(-1, d).sum(axis=0)
-        in_data = _measurements_used(collocation, probes, solved)
+        # What the curve uses up, from random vectors of +-1: Hutchinson's trace.
+        used, in_law = (
+            ((rows @ probes) * (rows @ solved)).mean(axis=1).reshape(-1, d)
+            for rows in (grid.measured, physics)
+        )
+        in_data = (used * collocation.sample_weights).sum(axis=0)
         missed = (collocation.precision * fit.residual**2).sum(axis=0)
         kicked = grid.node_weights @ collocation.physics_residual(state) ** 2
         data = np.maximum(collocation.counts - in_data, 1.0) / np.maximum(missed, LEAST)
-        law = np.maximum(unfitted - in_law, 1.0) / np.maximum(kicked, LEAST)
+        law = np.maximum(unfitted - in_law.sum(axis=0), 1.0) / np.maximum(kicked, LEAST)
         unknown = (collocation.counts > 0) & (not told)
         data = np.where(unknown, data, collocation.data_weights)
         law = np.where(free, law, collocation.physics_weights)
@@ -382,19 +380,6 @@ def _balanced(
         if (np.abs(change) < 0.1).all():
             break
     return collocation.solve(state, tolerance=1.0)
-
-
-def _measurements_used(collocation: Collocation, probes: Floats, solved: Floats) -> Floats:
-    """How many measurements of each coordinate the curve uses up, (d,): Hutchinson's trace.
-
-    From random vectors of +-1, (r d, m), and what the inverse of the normal matrix makes of them.
-    """
-    grid = collocation.grid
-    shape = (len(grid.x), collocation.d, -1)
-    before, after = (
-        (grid.samples @ v.reshape(grid.r, -1)).reshape(shape) for v in (probes, solved)
-    )
-    return ((before * after).mean(axis=2) * collocation.sample_weights).sum(axis=0)
 
 
 def like_kicks(fit: Fit, free: Bools, rng: np.random.Generator) -> float:
@@ -407,10 +392,9 @@ def like_kicks(fit: Fit, free: Bools, rng: np.random.Generator) -> float:
     collocation, grid, d = fit.collocation, fit.collocation.grid, fit.collocation.d
     factor, physics = collocation.factor(fit.state)
     kicks = rng.standard_normal((physics.shape[0], PROBES))
-    errors = rng.standard_normal((len(grid.x), d, PROBES))
-    weighted = np.sqrt(collocation.sample_weights)[:, :, None] * errors
-    pull = (grid.samples.T @ weighted.reshape(len(grid.x), -1)).reshape(grid.r * d, PROBES)
-    pull -= physics.T @ kicks
+    errors = rng.standard_normal((grid.x.size, PROBES))
+    weighted = np.sqrt(collocation.sample_weights).reshape(-1, 1) * errors
+    pull = grid.measured.T @ weighted - physics.T @ kicks
     simulated = kicks + physics @ cho_solve_banded((factor, True), pull)
     root = np.sqrt(grid.node_weights[:, None] * collocation.physics_weights)
     found = _bands((root * collocation.physics_residual(fit.state))[:, :, None])

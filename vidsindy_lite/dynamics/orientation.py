@@ -166,10 +166,8 @@ def _turns(problem: Problem, state: State, step: float = 1e-4) -> Floats:
     for generator in back if _places(problem) == 3 else back[2:, :2, :2]:
         copies = problem.d // len(generator)
         turn = step * np.kron(np.eye(copies), generator) * scale / scale[:, None]
-        ahead, behind = (
-            _mapped(problem.exponents, law, whole - by, -by @ away, whole + by)
-            for by in (turn, -turn)
-        )
+        ahead = _mapped(problem.exponents, law, whole - turn, -turn @ away, whole + turn)
+        behind = _mapped(problem.exponents, law, whole + turn, turn @ away, whole - turn)
         changes.append(np.append((ahead - behind).T / (2 * step), np.zeros(problem.d)))
     return np.column_stack(changes)
 

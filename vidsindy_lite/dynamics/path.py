@@ -124,9 +124,7 @@ def first_law(problem: Problem, history: History, tolerated: float | None = None
     degrees, implicit = problem.exponents.sum(axis=1), problem.form.implicit
     # Terms of denominators come last: a factor above and below the line changes nothing.
     stages = [~implicit & (degrees <= 2), ~implicit, np.ones_like(implicit)]
-    for k, rows in enumerate(stages):
-        if k and (rows == stages[k - 1]).all():
-            continue
+    for rows in {rows.tobytes(): rows for rows in stages}.values():  # of those alike, one
         whole = unpruned(tolerant, rows)
         history.add("all terms", whole)
         fit = cheapest(tolerant, whole, [(problem.origin, np.zeros(problem.d, dtype=bool))])
@@ -330,12 +328,9 @@ def refit(problem: Problem, path: Path, history: History) -> Fit | None:
 
 def _restricted(path: Path, active: Bools) -> State:
     """The state that the quadratic model around a fit promises for other terms, (l, d)."""
-    model, state = path.model, path.fit.state
-    support = np.append(active.T.ravel(), state.moving)[model.columns]
-    present = state.flat()[model.columns]
-    solution = minimiser(model.information, model.gradient, present, support)
-    flat = state.flat()
-    flat[model.columns] = solution
+    model, state, columns = path.model, path.fit.state, path.model.columns
+    support, flat = np.append(active.T.ravel(), state.moving)[columns], state.flat()
+    flat[columns] = minimiser(model.information, model.gradient, flat[columns], support)
     return state.moved(state.control_points, flat).of_terms(active)
 
 
@@ -348,7 +343,7 @@ def polish(problem: Problem, fit: Fit, history: History, most: int = 16) -> Fit:
     """
     collocation = problem.along(fit.collocation, fit.state)
     fit = problem.weighted(collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
-    columns, coarse = np.flatnonzero(fit.state.free()), fit.collocation.segments
+    columns, coarse = np.flatnonzero(fit.state.free()), fit.collocation.grid.segments
     before, parts = 1, 2
     while before < parts:
         last = fit

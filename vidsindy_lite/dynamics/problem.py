@@ -156,13 +156,10 @@ class Problem:
 
         It holds the data and their origin, and a spread more: a motion need not pass its centre.
         """
-        x = np.concatenate([values for _, (_, values) in self.stretches])
         movable, given = self.form.movable, self.origin
-        low, high = (
-            np.where(movable, extreme(extreme.reduce(x), given) + more, given)
-            for extreme, more in ((np.fmin, -1.0), (np.fmax, 1.0))
-        )
-        return low, high
+        x = np.vstack([given, *(values for _, (_, values) in self.stretches)])
+        low, high = np.nanmin(x, axis=0) - 1.0, np.nanmax(x, axis=0) + 1.0
+        return np.where(movable, low, given), np.where(movable, high, given)
 
     @property
     def axis_penalty(self) -> float:
@@ -183,7 +180,7 @@ class Problem:
         samples = sum(len(t) for t, _ in self.trajectories)
         return samples / self.turns if self.turns else np.inf
 
-    @property
+    @cached_property
     def spacing(self) -> float:
         """Length of a knot span, in time scales: wide where the noise is.
 
@@ -191,14 +188,11 @@ class Problem:
         moves, which few samples show: then spans are as much shorter, but for a single sample.
         """
         usual = 1 / 5 if self.noise.max() > 0.02 else 1 / 16
-        return min(usual, max(usual * 4 / self.rush, typical_step(self.trajectories)))
-
-    @cached_property
-    def rush(self) -> float:
-        """Speed, root mean square, along the way over that of all the time."""
         moves = np.nan_to_num(self.smoothed(1e-3) - self.smoothed(-1e-3))
         squares = (moves**2).sum(axis=1)
-        return float(np.sqrt((squares**2).mean()) / max(squares.mean(), LEAST))
+        # Speed, root mean square, along the way over that of all the time.
+        rush = float(np.sqrt((squares**2).mean()) / max(squares.mean(), LEAST))
+        return min(usual, max(usual * 4 / rush, typical_step(self.trajectories)))
 
     def part(self, enough: int = 5_000) -> Problem:
         """The same on pieces of its samples, evenly chosen; or itself.
@@ -283,15 +277,13 @@ class Problem:
 
     def law(self, state: State) -> PolynomialSystem:
         """The law of a state in its own frame."""
-        coefficients = state.coefficients + self.known
-        names, functions = self.form.names, self.functions
-        return PolynomialSystem(names, self.exponents, coefficients, functions=functions)
+        return replace(self.form, functions=self.functions).law(state.coefficients + self.known)
 
 
 def fit_curves(collocation: Collocation, curves: Sequence[Callable[[Floats], Floats]]) -> Floats:
     """Control points, (r, d), of the splines closest to the given curves, one a segment."""
     control = []
-    for segment, curve in zip(collocation.segments, curves, strict=True):
+    for segment, curve in zip(collocation.grid.segments, curves, strict=True):
         dense = segment.refined(4).breakpoints
         # scipy's least squares looks each point up among all knots: long data take minutes.
         rows = basis([segment.knots], np.array([0, len(segment.knots) - WIDTH]), [dense])
@@ -531,8 +523,7 @@ def pose(
     modes = [part.compress(seen, axis=1) / scale[:, None] for part in systematic]
     pulls, rest = _shared(trajectories, stretches, modes, [modes[i][at] for i, at in rows])
     d = len(form.names)
-    here, units = np.arange(d) < 0, Units(centre, scale, step / speed)
-    here[: len(seen)] = seen
+    here, units = np.pad(seen, (0, d - len(seen))), Units(centre, scale, step / speed)
 
     def among(values: Floats, filling: float = np.nan) -> Floats:
         """Values of all states from those of the coordinates that were seen, (n, ...)."""

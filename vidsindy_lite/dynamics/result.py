@@ -689,9 +689,8 @@ def _rest(law: Discovery) -> float:
     """
     places = [quantity for quantity in law.physics().quantities if quantity.name == "rest"]
     if not places:
-        sine, cosine = (
-            law.coefficients[law.terms.index(f"{f}({NAME})"), 1] for f in ("sin", "cos")
-        )
+        sine = law.coefficients[law.terms.index(f"sin({NAME})"), 1]
+        cosine = law.coefficients[law.terms.index(f"cos({NAME})"), 1]
         return float(np.arctan2(cosine, 0.0 - sine))
     return sum(float(q.value[0]) for q in places if abs(q.value[0]) > q.error[0])
 

@@ -428,10 +428,8 @@ def better(first: Discovery, second: Discovery) -> Discovery:
     terms.
     """
     m = first.system.states
-    terms, others = (
-        int(native.support[:, begin : begin + m].sum())
-        for native, begin in ((first.native, 0), (second.native, m))
-    )
+    terms = int(first.native.support[:, :m].sum())
+    others = int(second.native.support[:, m : 2 * m].sum())
     if (first.noise[:m] > 1.5 * second.noise[:m]).any():
         return replace(second, note="order 2: the law of order 1 misses the data")
     if not second.warnings and others <= terms:
