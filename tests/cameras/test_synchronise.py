@@ -95,7 +95,6 @@ def test_whole_lags_come_out_whole_and_a_small_fraction_is_not_rounded_away(moti
 
 
 def test_errors_are_those_of_least_squares(motion):
-    """Noise over the slope of the residuals in each lag, both as `residuals` shows them."""
     tracks = filmed(motion, (150,) * 3, (0, 0, 0))
     found = learn_lags(tracks, motion[1])
     assert found.frames.tolist() == [0, 0, 0]
@@ -193,7 +192,6 @@ def test_lags_at_half_a_pixel_of_noise():
 
 
 def test_a_wrong_rig_does_not_spoil_the_lags(motion):
-    """It leaves many pixels, and only then is it that cameras may turn."""
     first, second, third = motion[1].cameras
     turned = replace(second, normal=second.normal + 0.1 * second.rows[0])
     tracks = filmed(motion, (250,) * 3, (0, 9.3, -4), noise=0.2)
@@ -318,7 +316,6 @@ def test_a_shutter_is_told_in_frames_of_its_own_video():
      (2.0, 0.35, False)],
 )  # fmt: skip
 def test_noise_agrees_and_what_persists_does_not(motion, size, memory, told):
-    """Noise however large, unless it is gross; what is like the next frame's, if it is small."""
     rng = np.random.default_rng(0)
     misses = size * np.hstack([dependent(rng, 400, memory) for _ in range(3)])
     tracks = filmed(motion, (120,) * 3, (0, 0, 0))
