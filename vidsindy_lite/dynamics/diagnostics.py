@@ -695,8 +695,9 @@ def _late(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
     """
     state, collocation = fit.state, fit.collocation
     seen = np.flatnonzero(collocation.counts[: problem.measured[0][1].shape[1]]).tolist()
-    if problem.has_process_noise or len(seen) < 2:
-        return
+    met = (residual_noise(fit) <= CONSISTENT * problem.noise)[seen].all()
+    if problem.has_process_noise or len(seen) < 2 or not met:
+        return  # what leaves more than noise is no law, late or not
     each = zip(fit.splines, collocation.grid.segments, strict=True)
     step = typical_step(problem.trajectories) * np.concatenate([c(s.t, 1) for c, s in each])
     columns = np.flatnonzero(state.free())  # of which some are one too many
