@@ -44,7 +44,7 @@ from .models import (
     intersect,
     missed,
 )
-from .rig import Rig, check_calibrated, check_seen, check_views, reconstruct
+from .rig import Rig, check_calibrated, check_seen, check_views
 from .unmeasured import posed
 
 
@@ -469,7 +469,7 @@ def tracking_errors(
     if len(views[0]) < 2:
         raise ValueError(f"tracks: must have two frames or more, got {[*map(len, views)]}")
     if places is None:
-        places = partial(reconstruct, rig=rig)
+        places = partial(intersect, rig.cameras)  # of views that are at once already
     left = np.hstack(missed(rig.cameras, views))
     count = left.shape[1]
     left = np.abs(left[np.isfinite(left)])
