@@ -513,7 +513,7 @@ save_figure("fig_2", fig, caption=caption, numbers=numbers)
 # %% [markdown]
 # ## Run time and versions
 #
-# All cells take about 8 minutes on two cores, beside two other notebooks.
+# All cells take about 20 minutes on two cores.
 
 # %%
 print(versions())
