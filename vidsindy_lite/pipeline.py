@@ -504,7 +504,7 @@ def without_wild(track: Floats, name: str) -> tuple[Floats, str]:
     Without such a place those beside it are on one path, as they are not where a target bounces.
     """
     kept = seen = np.flatnonzero(np.isfinite(track).all(axis=1))
-    most, wild, limit = len(seen) // 10, list[int](), _smoothest(seen, track)
+    most, wild, limit = len(seen) // 10, list[int](), _most_missed(_missed(seen, track))
     while len(seen) <= len(kept) + most and ((apart := _missed(kept, track)) > limit).any():
         highest = sliding_window_view(np.pad(apart, 4), 9).max(axis=1)
         # The first three miss the same neighbours, by the same, and so do the last three.
@@ -525,14 +525,13 @@ def without_wild(track: Floats, name: str) -> tuple[Floats, str]:
 def kinks(track: Floats) -> Ints:
     """Frames at which a track, (n, 2), turns as no smooth motion does: it bounces, or is hit."""
     seen = np.flatnonzero(np.isfinite(track).all(axis=1))
-    return seen[_missed(seen, track) > _smoothest(seen, track)]
+    missed = _missed(seen, track)
+    return seen[missed > _most_missed(missed)]
 
 
-def _smoothest(rows: Ints, track: Floats) -> float:
-    """What places may miss their neighbours by: from so many medians on, one is no motion."""
-    if len(rows) < 10:
-        return np.inf
-    return max(8.0 * float(np.median(_missed(rows, track))), cameras.GROSS)
+def _most_missed(missed: Floats) -> float:
+    """By how much a place of a smooth motion may miss its neighbours, of what all do."""
+    return max(8.0 * float(np.median(missed)), cameras.GROSS) if len(missed) >= 10 else np.inf
 
 
 def _missed(rows: Ints, track: Floats) -> Floats:

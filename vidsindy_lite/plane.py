@@ -227,10 +227,10 @@ def discover_from_video(
         return law_of(pixels)
     pixels, held = _let_go(pixels, first)
     found = law_of(pixels, held)
-    if found.status != "ok":
-        part, hits = _unhit(pixels, first)
+    part, hits = _unhit(pixels, first)
+    if hits and found.status != "ok" and not warnings:  # doubts about the track are those of a part
         with suppress(ValueError):  # of a part that holds too little
-            other = law_of(part, held, hits) if hits else found
+            other = law_of(part, held, hits)
             found = other if other.status == "ok" else found
     return found
 
@@ -293,14 +293,14 @@ def _unhit(pixels: Floats, start: int) -> tuple[Floats, str]:
     first, last = int(ends[longest]) + 1, int(ends[longest + 1]) - 1
     if not len(turns) or last - first < 10:
         return pixels, ""
-    number = np.arange(len(pixels))[:, None]
+    first, last = start + first, start + last
     places = np.split(turns, np.flatnonzero(np.diff(turns) > 2) + 1)
     each = ", ".join(str(start + int(np.median(one))) for one in places[:5])
     told = (
-        f"it turns sharply at frames {each}, as where it bounces, is hit, or frames lack: counted "
-        f"from {start + first} to {start + last}"
+        f"it turns sharply at frames {each}, as where it bounces, is hit, or frames are missing: "
+        f"counted from {first} to {last}"
     )
-    return np.where((number >= first) & (number <= last), pixels, np.nan), told
+    return _between((first, last), pixels, start), told
 
 
 def _let_go(pixels: Floats, start: int) -> tuple[Floats, str]:
