@@ -10,7 +10,7 @@ not, with the curve already eliminated.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 
@@ -116,12 +116,15 @@ class Fit:
     criterion : float
         Objective and penalties, where the fit compares laws (of a candidate that is not refined
         yet, by the quadratic model); else NaN.
+    information : ndarray, shape (m, m)
+        Of what is free, where the fit has converged; else empty.
     """
 
     state: State
     collocation: Collocation
     status: Status
     criterion: float = np.nan
+    information: Floats = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
     def splines(self) -> list[BSpline]:
@@ -190,6 +193,10 @@ class WithCurve(Linearisation):
         """
         gram, _ = _without_systematic(share * self.gram, self.sizes)
         return Linearisation(share * self.fall, self.columns, gram[1:, 1:], -gram[1:, 0])
+
+    def without_systematic(self, precision: Floats) -> tuple[Floats, Floats]:
+        """The problem, and `shared`, where the systematic errors are 0 with these precisions."""
+        return _without_systematic(self.gram, self.sizes, precision)
 
     def along(self, state: State, step: Floats, fraction: float) -> State:
         """The state after a fraction of a step, with the curve that goes with it."""
@@ -459,7 +466,8 @@ class Collocation:
             step, promise = model.newton(damping)
             if damping == 0.0 and promise < tolerance:
                 last = model.along(state, step, 1.0)
-                return Fit(last if self.objective(last) < value else state, self, Status.CONVERGED)
+                last = last if self.objective(last) < value else state
+                return Fit(last, self, Status.CONVERGED, information=model.information)
             for fraction in (1.0, 0.3, 0.1):
                 trial = model.along(state, step, fraction)
                 trial_value = self.objective(trial)
@@ -475,15 +483,17 @@ class Collocation:
         return Fit(state, self, Status.MAX_STEPS)
 
 
-def _without_systematic(gram: Floats, sizes: Floats) -> tuple[Floats, Floats]:
+def _without_systematic(
+    gram: Floats, sizes: Floats, precision: Floats | float = 1.0
+) -> tuple[Floats, Floats]:
     """Eliminate the sizes of the systematic errors, which go with the law as the curve does.
 
-    They have mean 0 and variance 1.
+    They have mean 0 and variance 1, or 1 / ``precision``.
     """
     size = len(gram) - len(sizes)
     pull = gram[size:, :size].copy()
-    pull[:, 0] += sizes
-    shared = -np.linalg.solve(gram[size:, size:] + np.eye(len(sizes)), pull)
+    pull[:, 0] += precision * sizes
+    shared = -np.linalg.solve(gram[size:, size:] + precision * np.eye(len(sizes)), pull)
     left = gram[:size, :size] + pull.T @ shared
-    left[0, 0] += sizes @ sizes
+    left[0, 0] += precision * sizes @ sizes
     return left, np.asarray(shared, dtype=float)

@@ -440,7 +440,7 @@ def diagnose(
     """
     wider = widened(problem, fit)
     # Without errors that the splines could tell from their own: what is clean cannot be cleaner.
-    clean = bool((fit.collocation.data_weights**-0.5 <= CLEANEST).all())
+    clean = bool((residual_noise(fit) <= CLEANEST).all())
     remedy = "cleaner samples or a longer trajectory"
     if clean:
         remedy = "a longer trajectory, denser samples or other starts"
@@ -704,18 +704,20 @@ def _late(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
     costs, present = problem.costs(columns), state.flat()[columns]
     support, priced = np.ones(len(columns), dtype=bool), np.isfinite(costs)
     own, found = collocation.objective(state) + costs[priced].sum(), []
-    for j in seen:
-        later = (step * (np.arange(problem.d) == j))[..., None]
-        shared = np.concatenate([collocation.systematic, later], axis=2)
-        beside = replace(collocation, systematic=shared)
-        model = beside.linearise(state, columns)
-        start = model.information, model.gradient, present, costs, support
+    lags = step[:, :, None] * np.eye(problem.d)[:, seen]
+    shared = np.concatenate([collocation.systematic, lags], axis=2)
+    model = replace(collocation, systematic=shared).linearise(state, columns)
+    for row, j in enumerate(seen, len(model.sizes) - len(seen)):
+        precision = np.repeat([1.0, 1e9], [len(model.sizes) - len(seen), len(seen)])
+        precision[row] = 1.0  # one lag at a time: the others are 0
+        left, moves = model.without_systematic(precision)
+        start = left[1:, 1:], -left[1:, 0], present, costs, support
         terms, solution, value = subset_search(*start)
         fewer = int((priced & ~terms).sum())
-        gain = own - (beside.objective(state) - model.fall + value)
-        sizes = model.sizes + model.shared @ np.append(1.0, solution - present)
+        gain, moved = own - (left[0, 0] + value), np.append(1.0, solution - present)
         if fewer > 1 and gain > STRONG:
-            found.append((gain, fewer, law.names[j], -float(sizes[-1])))
+            size = model.sizes[row] + moves[row] @ moved
+            found.append((gain, fewer, law.names[j], -float(size)))
     if found:
         gain, fewer, name, size = max(found)
         when = f"{abs(size):.2g} of a step {'later' if size > 0 else 'earlier'}"

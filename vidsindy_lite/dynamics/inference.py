@@ -107,7 +107,9 @@ def infer(
     def told(curve: BSpline) -> BSpline:
         return BSpline(curve.t * units.time, curve.c * units.scale + units.centre, DEGREE)
 
-    around = bent(fit).collocation.linearise(state, np.flatnonzero(state.free()))
+    own, shared = np.flatnonzero(state.free()), bent(fit).collocation
+    bends = shared.systematic.shape[2] > collocation.systematic.shape[2]
+    around = shared.linearise(state, own) if bends else model.of(own)
     return Discovery(
         **_in_both_frames(problem, fit, around, offset, penalties),
         native=form.law(coefficients + form.known),

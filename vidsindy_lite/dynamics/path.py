@@ -115,7 +115,7 @@ def first_law(problem: Problem, history: History, tolerated: float | None = None
     tolerant, part = replace(problem, noise=noise), problem.part()
     if part is not problem:
         its_own = replace(history, bar=None)  # rounds of a part are none of those that it counts
-        law, *_ = persistent(part, first_law(part, its_own, tolerated), its_own)
+        law = first_law(part, its_own, tolerated)
         collocation = tolerant.collocation(tolerant.segments())
         state = replace(law.state, control_points=fit_curves(collocation, problem.curves))
         fit = tightened(tolerant, collocation, state)
@@ -339,7 +339,7 @@ def polish(problem: Problem, fit: Fit, history: History, most: int = 16) -> Fit:
 
     What knots do to a coefficient falls with the fourth power of their distance, so two fits tell
     into how many parts a span has to go: at ``most`` so many. Less than a tenth of a standard error
-    is fine, or, of nearly exact data, some ten-millionths.
+    is fine, or, of nearly exact data, a millionth.
     """
     collocation = problem.along(fit.collocation, fit.state)
     fit = problem.weighted(collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
@@ -350,12 +350,13 @@ def polish(problem: Problem, fit: Fit, history: History, most: int = 16) -> Fit:
         finer = problem.collocation([s.refined(parts) for s in coarse], errors_left(problem, last))
         state = replace(last.state, control_points=fit_curves(finer, last.splines))
         fit = problem.weighted(problem.along(finer, state), FINAL_WEIGHT).solve(state, EXACT)
-        information = fit.collocation.linearise(fit.state, columns).information
-        allowed = np.maximum(0.1 * np.sqrt(np.diag(inverse(information))), 3e-7)
+        if fit.status is not Status.CONVERGED:
+            break
+        allowed = np.maximum(0.1 * np.sqrt(np.diag(inverse(fit.information))), 1e-6)
         change = np.abs(fit.state.flat() - last.state.flat())[columns]
         error = (change / allowed).max(initial=0.0) / ((parts / before) ** 4 - 1)
         before = parts
-        if error > 1 and fit.status is Status.CONVERGED:
+        if error > 1:
             # A quarter more at once: the errors that the law leaves fall, too.
             parts = min(int(np.ceil(1.25 * parts * error**0.25)), most)
     history.add("polish", fit)
