@@ -298,6 +298,21 @@ def test_what_bounces_counts_between_two_bounces(monkeypatch):
     assert (found.status, abs(found.g.value - 9.81) < 2 * found.g.error) == ("ok", True)
 
 
+def test_a_flight_from_a_hand_into_a_hand_counts_alone(monkeypatch):
+    x, grows = flight()[1], np.linspace(0, 1, 16)[:, None] ** 3 / 6  # for half a second
+    swing = x[0] + (grows[:-1] - 1 / 6) * [1.5, 5.0]
+    caught = x[-1] + (1 / 6 - grows[-2::-1]) * [1.5, 5.0 - 9.81 * 33 / 30]
+    filmed(monkeypatch, pixels_of(noisy(np.concatenate([swing, x, caught]), 0)))
+    found = vl.discover_from_video("throw.mp4", STICK)
+    first, last = map(
+        int, re.search(r"flies freely from frame (\d+) to (\d+)", found.rig.note).groups()
+    )
+    assert 13 <= first <= 15 < 48 <= last <= 50
+    assert (found.status, abs(found.g.value - 9.81) < 2 * found.g.error) == ("ok", True)
+    # Without a length, nothing tells what falls from what a hand turns round.
+    assert vl.discover_from_video("throw.mp4").status == "suspect"
+
+
 def test_a_wrong_length_and_a_wrong_vertical_are_told(monkeypatch):
     filmed(monkeypatch, pixels_of(noisy(flight()[1], 0)))
     found = vl.discover_from_video("throw.mp4", (*STICK[:4], 0.7), up=(0.3, -1))

@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.polynomial.polynomial import polyfit, polyval
 
 from .arrays import Floats
 from .cameras import Lags, OrthographicCamera, Rig
@@ -27,6 +29,7 @@ from .pipeline import (
     kinks,
     law_options,
     noted,
+    roughness,
     times_of,
     tracked,
     with_law,
@@ -133,7 +136,8 @@ def discover_from_video(
     frames : (first, last), optional
         What counts of the film, from 0 and both included: the target may be in a hand before, or on
         the ground after that. By default all but the rest of what is held still and then let go; or
-        the longest part without a bounce or a hit, where that alone has a law beyond doubt.
+        the longest part without a bounce or a hit, or in free flight with the pull of the earth,
+        where that alone has a law beyond doubt.
     individual : str, optional
         Which of several targets of a text file; see `read_tracks`.
     hint, detector
@@ -227,11 +231,12 @@ def discover_from_video(
         return law_of(pixels)
     pixels, held = _let_go(pixels, first)
     found = law_of(pixels, held)
-    part, hits = _unhit(pixels, first)
-    if hits and found.status != "ok" and not warnings:  # doubts about the track are those of a part
-        with suppress(ValueError):  # of a part that holds too little
-            other = law_of(part, held, hits)
-            found = other if other.status == "ok" else found
+    for part, told, free in (*_unhit(pixels, first), False), (*_flight(pixels, first), True):
+        if told and found.status != "ok" and not warnings:  # doubts about a track are its parts'
+            with suppress(ValueError):  # of a part that holds too little
+                other = law_of(part, held, told)
+                flies = other.unit == "m" and other.g is not None
+                found = other if other.status == "ok" and (flies or not free) else found
     return found
 
 
@@ -301,6 +306,30 @@ def _unhit(pixels: Floats, start: int) -> tuple[Floats, str]:
         f"counted from {first} to {last}"
     )
     return _between((first, last), pixels, start), told
+
+
+def _flight(pixels: Floats, start: int) -> tuple[Floats, str]:
+    """The longest part of a track that is a parabola to within its noise, and what to say of it.
+
+    It starts at some frame. What comes before and after is another motion, as that of a hand, if it
+    is farther from the parabola than the part is long: a drag, or a plane askew, bends it by less.
+    """
+    seen = np.flatnonzero(np.isfinite(pixels).all(axis=1))
+    limit = 4 * float(np.median(roughness(seen, pixels))) if len(seen) else 0.0
+    for count in range(len(seen), 9, -1):
+        parabolas = np.linalg.qr(np.vander(np.arange(count), 3))[0]
+        parts = sliding_window_view(pixels, count, axis=0)
+        left = np.abs(parts - parts @ parabolas @ parabolas.T).max(axis=(1, 2))
+        k = int(np.where(np.isfinite(left), left, np.inf).argmin())
+        if left[k] <= limit:
+            own, first, last = np.arange(k, k + count), start + k, start + k + count - 1
+            along = polyval(seen - k, polyfit(own - k, pixels[own], 2)).T
+            apart = np.linalg.norm(along - pixels[seen], axis=1).max()
+            if apart < np.linalg.norm(np.ptp(pixels[own], axis=0)):
+                break
+            told = f"it flies freely from frame {first} to {last}, which alone are counted"
+            return _between((first, last), pixels, start), told
+    return pixels, ""
 
 
 def _let_go(pixels: Floats, start: int) -> tuple[Floats, str]:
