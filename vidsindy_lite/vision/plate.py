@@ -194,9 +194,17 @@ def _masked_median(
         layers = np.empty((len(samples), strip[1], width, 3), np.uint8)
         here = np.zeros((strip[1], width), np.uint8)
         for k, (sample, full, move) in enumerate(zip(samples, shows, moves, strict=True)):
-            there = cv2.warpPerspective(sample, up @ move, strip)
-            layers[k] = cv2.multiply(there, np.array([*gains[k], 0.0]))
-            shown = cv2.warpPerspective(full, up @ move, strip, flags=cv2.INTER_NEAREST) > 0
+            if np.array_equal(move, np.eye(3)) and sample.shape[:2] == (height, width):
+                there, shown = (image[top : top + strip[1]] for image in (sample, full))
+            else:
+                there = cv2.warpPerspective(sample, up @ move, strip)
+                shown = cv2.warpPerspective(full, up @ move, strip, flags=cv2.INTER_NEAREST)
+            same = (gains[k] == 1).all()
+            layers[k] = there if same else cv2.multiply(there, np.array([*gains[k], 0.0]))
+            shown = shown > 0
+            if shown.all():
+                here += 1
+                continue
             missing = k - here  # samples before it that show nothing
             layers[k][~shown] = np.where(missing[~shown] % 2, 255, 0)[:, None]
             here += shown
