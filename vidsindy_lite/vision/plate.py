@@ -52,10 +52,14 @@ def changes(frame: Image, ground: Image, factor: Floats32) -> Floats32:
 
     What is saturated is at least so bright: what is brighter than that is no difference.
     """
+    if (factor == 1).all():
+        return np.asarray(cv2.subtract(frame, ground, dtype=cv2.CV_32F), np.float32)
     then = relit(ground, factor)
-    if factor.min() < 1:
-        np.maximum(then, frame, out=then, where=ground >= 250)  # 255, but for compression
-    return np.asarray(frame - (np.minimum(then, 255) if factor.max() > 1 else then), np.float32)
+    if factor.min() < 1 and (bright := ground >= 250).any():  # 255, but for compression
+        np.maximum(then, frame, out=then, where=bright)
+    if factor.max() > 1:
+        np.minimum(then, 255, out=then)
+    return np.asarray(cv2.subtract(frame, then, then, dtype=cv2.CV_32F), np.float32)
 
 
 def carry(maps: NDArray, points: Floats) -> Floats:
