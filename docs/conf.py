@@ -83,6 +83,7 @@ apidoc_modules = [{
     "path": ROOT / "vidsindy_lite", "destination": "build/api", "module_first": True,
     "separate_modules": True, "exclude_patterns": ["**/__main__.py"],
 }]  # fmt: skip
+autodoc_use_type_comments = False  # there are none, and every function would be parsed for them
 autodoc_typehints = "none"  # each argument says its own
 default_role = "py:obj"
 napoleon_use_param = False  # or "shape" in the type of an argument links to `Scene.shape`
@@ -141,13 +142,16 @@ def launchers(page, origin):
     return f"Open it on [Binder]({binder}) or [Colab]({colab})."
 
 
+@cache  # every notebook asks
+def captions_of_figures():
+    """What stands under each figure and table."""
+    files = (ROOT / "figures").glob("*.json")
+    return {path.stem: json.loads(path.read_text("utf-8"))["caption"] for path in files}
+
+
 def described(notebook, links=""):
     """A notebook with its minutes to read under its title, and its pictures with their captions."""
-    captions = {
-        path.stem: json.loads(path.read_text("utf-8"))["caption"]
-        for path in (ROOT / "figures").glob("*.json")
-    }
-    words = lines = 0
+    captions, words, lines = captions_of_figures(), 0, 0
     for cell in notebook["cells"]:
         text = "".join(cell["source"])
         if cell["cell_type"] == "code":

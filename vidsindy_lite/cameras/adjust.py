@@ -128,7 +128,9 @@ def known_to(given: Camera) -> Floats:
 
 def changed(camera: Camera, change: Floats) -> Camera:
     """A calibrated camera after a change; lag and drift are none of its own."""
-    part = {name: change[place] for name, place in PARTS.items()}
+    if not change.any():
+        return camera
+    part = {name: change[place[0] : place[-1] + 1] for name, place in PARTS.items()}
     values: dict[str, Any] = {}
     if part["normal"].any():
         normal = camera.normal + part["normal"] @ camera.rows

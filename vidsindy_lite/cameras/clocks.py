@@ -171,7 +171,9 @@ class Curve:
         within = np.clip(frames, self.clock[0], self.clock[-1])
         low = np.searchsorted(self.clock, within, "right") - 1
         high = np.searchsorted(self.clock, within, "left")
-        values = np.where((low == high)[..., None], self.track[low], self._spline(within))
+        values, between = self.track[low], low != high
+        if between.any():
+            values[between] = self._spline(within[between])
         # Frames between two that it is interpolated from: one of them may be dropped.
         near = self.clock[high] - self.clock[low] <= 2.5
         values[~((frames == within) & self.shown[low] & self.shown[high] & near)] = np.nan

@@ -46,7 +46,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import hypot
 from typing import Any, ClassVar, Self
 
@@ -358,8 +358,10 @@ class Camera(ABC):
 
     def steadied(self, track: Floats) -> Floats:
         """What it would have seen if it read all rows at once: the track at whole frames."""
+        if self.readout == 0:
+            return track
         shown = np.flatnonzero(np.isfinite(track).all(axis=1))
-        if self.readout == 0 or len(shown) < 4:
+        if len(shown) < 4:
             return track
         height = self.image_size[1]
         behind = self.readout * (track[shown, 1] - (height - 1) / 2) / height
@@ -386,10 +388,11 @@ class Camera(ABC):
         return self.moved(position=frozen(offset @ self.rows))
 
 
+@lru_cache(maxsize=64)  # slopes of one camera ask for the same again and again
 def turn(angle: float) -> Floats:
     """T(theta), shape (2, 2)."""
     c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, s], [-s, c]])
+    return frozen(np.array([[c, s], [-s, c]]))
 
 
 def frozen(array: Floats) -> Floats:

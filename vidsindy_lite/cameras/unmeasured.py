@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import combinations, product
 from typing import NamedTuple
 
@@ -363,8 +364,13 @@ def _polished(footage: Footage, lags: Floats, rank: int) -> tuple[Floats, Floats
 
 def _images(footage: Footage, lags: Floats, places: Sequence[int]) -> Floats:
     """Tracks of some views that begin so late, side by side, (n, 2 m)."""
-    late = replace(footage, lags=lags)
-    return np.hstack([late.curves[i].at(late.frames(i)) for i in places])
+    return np.hstack([_image(footage, i, float(lags[i])) for i in places])
+
+
+@lru_cache(maxsize=512)  # a search tries the same lags of one view beside many of the others
+def _image(footage: Footage, i: int, lag: float) -> Floats:
+    """The track of one view that begins so late, (n, 2)."""
+    return footage.curves[i].at((footage.instants - lag) * footage.rates[i])
 
 
 def _spread(images: Floats) -> tuple[Floats, Floats, Floats]:
@@ -388,5 +394,6 @@ def _beyond(images: Floats, rank: int) -> Floats:
         if shown.sum() >= 4:
             part = np.ix_(seen == views, shown)
             along, _ = np.linalg.qr(axes[:rank, shown].T)
-            left[part] = off[part] - off[part] @ along @ along.T
+            some = off[part]
+            left[part] = some - some @ along @ along.T
     return left

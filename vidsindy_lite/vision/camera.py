@@ -177,7 +177,7 @@ def _fit(
             offset = float(np.median(miss[known][::2]))
             miss -= offset
         # Grey levels; a deviation without any noise.
-        spread = max(1.4826 * float(np.median(np.abs(miss[known])[::2])), 0.3)
+        spread = max(1.4826 * float(np.median(np.abs(miss[known][::2]))), 0.3)
         bound = max(3 * spread, loose / 2**step)
         weight = share * known / (1 + (miss / bound) ** 2) ** 2
         heavy = steep * weight.ravel()
@@ -282,10 +282,10 @@ def _moved(before: Look, after: Look) -> float:
     NaN if that cannot be told.
     """
     rest = np.eye(3)
-    found = _Key(before, rest, 0.0).locate(after, rest)
+    a, b = before.follow(after, rest)
+    found = _Key(before, rest, 0.0).locate(after, rest, (a, b))
     if found is None:
         return np.nan
-    a, b = before.follow(after, rest)
     stay, share = (
         np.sum(np.linalg.norm(carry(here, a) - b, axis=1) < _STILL) for here in (rest, found.map)
     )
@@ -302,12 +302,11 @@ def displacement(maps: Floats, size: Sequence[int]) -> Floats:
     return np.array([np.sqrt(np.mean(np.sum((carry(h, points) - points) ** 2, 1))) for h in maps])
 
 
-def _by_corners(before: Look, after: Look, last: Floats) -> tuple[Aligned | None, bool]:
-    """Where a frame lies in another, by its corners, from a map that is about right.
+def _by_corners(a: Floats, b: Floats) -> tuple[Aligned | None, bool]:
+    """Where a frame lies in another, by where its corners are in both.
 
     And whether they need no other witness: they are many, and tell the map exactly.
     """
-    a, b = before.follow(after, last)
     if len(a) < 20:  # fewer are not worth a look
         return None, False
     found, obey = cv2.estimateAffinePartial2D(a, b, ransacReprojThreshold=2 * LOOSE)
@@ -332,12 +331,14 @@ class _Key(NamedTuple):
     base: Floats
     error: float
 
-    def locate(self, look: Look, last: Floats) -> Aligned | None:
+    def locate(
+        self, look: Look, last: Floats, corners: tuple[Floats, Floats] | None = None
+    ) -> Aligned | None:
         """Where it lies in another, from a map that is about right.
 
-        By corners; if these are few, perhaps by pixels.
+        By corners, which may have been followed already; if these are few, perhaps by pixels.
         """
-        told, alone = _by_corners(self.look, look, last)
+        told, alone = _by_corners(*(corners or self.look.follow(look, last)))
         if alone:
             return told
         direct = align(self.look, look, last)

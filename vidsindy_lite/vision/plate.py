@@ -52,10 +52,14 @@ def changes(frame: Image, ground: Image, factor: Floats32) -> Floats32:
 
     What is saturated is at least so bright: what is brighter than that is no difference.
     """
+    if (factor == 1).all():
+        return np.asarray(cv2.subtract(frame, ground, dtype=cv2.CV_32F), np.float32)
     then = relit(ground, factor)
-    if factor.min() < 1:
-        np.maximum(then, frame, out=then, where=ground >= 250)  # 255, but for compression
-    return np.asarray(frame - (np.minimum(then, 255) if factor.max() > 1 else then), np.float32)
+    if factor.min() < 1 and (bright := ground >= 250).any():  # 255, but for compression
+        np.maximum(then, frame, out=then, where=bright)
+    if factor.max() > 1:
+        np.minimum(then, 255, out=then)
+    return np.asarray(cv2.subtract(frame, then, then, dtype=cv2.CV_32F), np.float32)
 
 
 def carry(maps: NDArray, points: Floats) -> Floats:
@@ -194,9 +198,17 @@ def _masked_median(
         layers = np.empty((len(samples), strip[1], width, 3), np.uint8)
         here = np.zeros((strip[1], width), np.uint8)
         for k, (sample, full, move) in enumerate(zip(samples, shows, moves, strict=True)):
-            there = cv2.warpPerspective(sample, up @ move, strip)
-            layers[k] = cv2.multiply(there, np.array([*gains[k], 0.0]))
-            shown = cv2.warpPerspective(full, up @ move, strip, flags=cv2.INTER_NEAREST) > 0
+            if np.array_equal(move, np.eye(3)) and sample.shape[:2] == (height, width):
+                there, shown = (image[top : top + strip[1]] for image in (sample, full))
+            else:
+                there = cv2.warpPerspective(sample, up @ move, strip)
+                shown = cv2.warpPerspective(full, up @ move, strip, flags=cv2.INTER_NEAREST)
+            same = (gains[k] == 1).all()
+            layers[k] = there if same else cv2.multiply(there, np.array([*gains[k], 0.0]))
+            shown = shown > 0
+            if shown.all():
+                here += 1
+                continue
             missing = k - here  # samples before it that show nothing
             layers[k][~shown] = np.where(missing[~shown] % 2, 255, 0)[:, None]
             here += shown
