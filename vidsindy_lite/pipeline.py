@@ -538,14 +538,7 @@ def roughness(rows: Ints, track: Floats) -> Floats:
     """By how much places of a track miss the cubic through the four beside each, over its noise."""
     if len(rows) < 5:
         return np.zeros(len(rows))
-    x, own = track[rows], np.arange(len(rows))[:, None]
-    window = np.clip(own - 2, 0, len(rows) - 5) + np.arange(5)
-    beside = window[window != own].reshape(-1, 4)
-    others = rows[beside]
-    away, between = others - rows[own], others[:, :, None] - others[:, None]
-    weights = np.prod(away, axis=1, keepdims=True) / away / np.prod(between + np.eye(4), axis=2)
-    missed = x + np.einsum("nj,nji->ni", weights, x[beside])
-    return np.linalg.norm(missed, axis=1) / np.sqrt(1 + (weights**2).sum(axis=1))
+    return np.pad(np.linalg.norm(vision.bends(rows, track[rows]), axis=1), 2, mode="edge")
 
 
 def check_found(

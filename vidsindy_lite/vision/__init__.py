@@ -17,6 +17,7 @@
 from .candidates import Hint, load_hints
 from .film import Track, track_targets
 from .plate import carry
+from .refining import bends
 from .rendering import BACKGROUNDS, SHAPES, Scene, render, render_labelled, render_restless
 from .rendering import render_video
 from .track_files import TrackFile, read_tracks

@@ -307,16 +307,25 @@ def roughness(frames: Floats, places: Floats, areas: Floats) -> tuple[Floats, fl
     return np.hypot(scatter(frames, places), worst), torn
 
 
+def bends(frames: Floats | Ints, places: Floats) -> Floats:
+    """How far five places (n, d) in a row are off any cubic, (n - 4, d), over the error of a place.
+
+    That is their fourth divided difference. Each of the five misses the cubic through the others by
+    as much, over the error of that.
+    """
+    five = np.arange(len(frames) - 4)[:, None] + np.arange(5)
+    apart = frames[five][:, :, None] - frames[five][:, None]
+    fourth = 1 / (apart + np.eye(5)).prod(axis=2)
+    fourth /= np.linalg.norm(fourth, axis=1, keepdims=True)
+    return np.asarray(np.einsum("nk,nkd->nd", fourth, places[five]))
+
+
 def scatter(frames: Floats, places: Floats) -> float:
     """Standard error of the places (n, 2) of a smooth motion, per axis: how rough they are."""
-    runs = np.flatnonzero(frames[4:] - frames[:-4] < 4.5)
-    if len(runs) < 3:
+    close = frames[4:] - frames[:-4] < 4.5  # where no frame is missing
+    if close.sum() < 3:
         return float("inf")
-    five = runs[:, None] + np.arange(5)
-    apart = frames[five][:, :, None] - frames[five][:, None]
-    fourth = 1 / (apart + np.eye(5)).prod(axis=2)  # divided differences
-    fourth /= np.linalg.norm(fourth, axis=1, keepdims=True)
-    return float(1.4826 * np.median(np.abs(np.einsum("nk,nkd->nd", fourth, places[five]))))
+    return float(1.4826 * np.median(np.abs(bends(frames, places)[close])))
 
 
 def whole(
