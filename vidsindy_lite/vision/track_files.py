@@ -33,20 +33,18 @@ from __future__ import annotations
 import csv
 import os
 import re
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, product
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..arrays import Bools, Floats
 from ..storage import check_file, read_text, reading
 
-_BINARY = {
-    ".h5": "a table of DeepLabCut or SLEAP", ".hdf5": "a table in HDF5", ".slp": "a SLEAP project",
-    ".mat": "MATLAB's", ".pickle": "a pickle", ".pkl": "a pickle", ".xlsx": "a spreadsheet",
-    ".ods": "a spreadsheet", ".kva": "Kinovea's own", ".trk": "Tracker's own", ".npy": "an array",
-}  # fmt: skip
 # Names of columns of several cameras or targets: of DLTdv and Argus, of ours, of poses.
 _SERIES = (
     re.compile(r"(?P<target>.+)_cam(?P<below>_?)(?P<camera>\d+)_(?P<axis>[xy])"),
@@ -57,34 +55,12 @@ _TIME = re.compile(
     r"(?:t|times?|timestamp)(?:[ _(\[/]*(s|sec|seconds|ms|msec|us|µs|ns)[)\]]*)?|"
     r"(seconds|milliseconds|ms)"
 )
-_FRAME = (
-    "frame", "frames", "step", "n", "frame_idx", "frame_id", "frame_number", "frame_no", "frameid",
-    "frame_index", "framenumber", "frame_num", "frame_n", "fnum", "slice", "slice_n", "image",
-)  # fmt: skip
-_PIXELS = (
-    ("u", "v"), ("pixelx", "pixely"), ("x", "y"), ("x_px", "y_px"), ("position_x", "position_y"),
-)  # fmt: skip
-_WHOSE = (
-    "track", "track_id", "track_n", "particle", "id", "object", "object_id", "tid", "individual",
-)  # fmt: skip
-# Corner and size of a box, as the names of their columns.
-_SIZED = tuple(product(
-    (("left", "top"), ("bb_left", "bb_top"), ("bbox_left", "bbox_top"), ("bbox_x", "bbox_y"),
-     ("x", "y"), ("u", "v")),
-    (("w", "h"), ("width", "height"), ("bb_width", "bb_height"), ("bbox_w", "bbox_h"),
-     ("bbox_width", "bbox_height")),
-))  # fmt: skip
-_OPPOSITE = (
-    (("x1", "y1"), ("x2", "y2")), (("xmin", "ymin"), ("xmax", "ymax")),
-    (("left", "top"), ("right", "bottom")),
-)  # fmt: skip
-_ANSWERS = {"true": "1", "yes": "1", "false": "0", "no": "0"}
-_UNSEEN = {"", "na", "n/a", "#n/a", "null", "none", "-", "--", "missing", "lost", "?"}
-_SEEN = (
-    "visible", "visibility", "seen", "detected", "found", "valid", "score", "conf", "confidence",
-)  # fmt: skip
-_HIDDEN = ("occluded", "lost", "missing", "outside", "invisible")
-_READ = {"frame", "likelihood", *_SEEN, *_HIDDEN, *chain(*_PIXELS, *chain(*_SIZED, *_OPPOSITE))}
+# Other names, and what stands in cells.
+_WORDS: dict[str, Any] = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+_SIZED = list(product(_WORDS["corners"], _WORDS["sizes"]))  # corner and size of a box
+_BOXES = [*_SIZED, *_WORDS["opposite"]]
+_READ = {"frame", "likelihood", *_WORDS["seen"], *_WORDS["hidden"]}
+_READ |= {*chain(*_WORDS["pixels"], *chain(*_BOXES))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +118,7 @@ def read_tracks(path: str | os.PathLike, individual: str | None = None) -> list[
         chosen.
     """
     path = check_file("tracks", path)
-    if kind := _BINARY.get(path.suffix.lower()):
+    if kind := _WORDS["binary"].get(path.suffix.lower()):
         raise ValueError(
             f"tracks: must be a table as text, got '{path.name}', {kind}: export it as CSV"
         )
@@ -181,7 +157,7 @@ def _tracks(
     names = [names[0] or "index", *names[1:]] if names else names
     width = len(names) or max(map(len, rows))
     rows = [[*row, *[""] * (width - len(row))] for row in rows]
-    who, chosen = _column(names, _WHOSE), ""
+    who, chosen = _column(names, _WORDS["target"]), ""
     if who is not None:
         for row in rows:
             row[who] = re.sub(r"\.0+$", "", row[who].strip())  # a number is called so, too
@@ -190,7 +166,7 @@ def _tracks(
         whose = sorted(words, key=lambda word: (len(word), word))
         chosen = _chosen(whose, individual, lenient=True)
         rows = [row for row in rows if row[who] == chosen]
-    frame = _column(names, _FRAME)
+    frame = _column(names, _WORDS["frame"])
     counted = frame is not None
     if names[:1] == ["index"] and frame is None and who is None:
         frame = 0  # of the rows of a table: those that are left out are frames without a target
@@ -208,7 +184,7 @@ def _tracks(
     if who is not None and "frame" in names:
         values = values[np.argsort(values[:, names.index("frame")], kind="stable")]
     twice = {key for key in names if key and names.count(key) > 1}
-    if twice & {key for pair in _PIXELS for key in pair}:
+    if twice & {key for pair in _WORDS["pixels"] for key in pair}:
         raise _several([f"{key} {names.count(key)} times" for key in sorted(twice)])
     columns = {key: values[:, names.index(key)] for key in names if key}
     told = [m for known in _SERIES for key in columns if (m := known.fullmatch(key))]
@@ -309,7 +285,7 @@ def _is_of_numbers(row: Sequence[str]) -> bool:
 def _number(cell: str) -> float | None:
     word = cell.strip().lower()
     try:
-        return np.nan if word in _UNSEEN else float(_ANSWERS.get(word, word))
+        return np.nan if word in _WORDS["empty"] else float(_WORDS["answers"].get(word, word))
     except ValueError:
         return None
 
@@ -428,8 +404,8 @@ def _track(
     Those of the world of a program may have any origin and unit.
     """
     doubts: tuple[str, ...] = ()
-    box = next((box for box in (*_SIZED, *_OPPOSITE) if {*box[0], *box[1]} <= columns.keys()), None)
-    pair = next((pair for pair in _PIXELS if set(pair) <= columns.keys()), None)
+    box = next((box for box in _BOXES if {*box[0], *box[1]} <= columns.keys()), None)
+    pair = next((pair for pair in _WORDS["pixels"] if set(pair) <= columns.keys()), None)
     if box:
         low, high = (np.array([columns[key] for key in keys]) for keys in box)
         sides = high if box in _SIZED else high - low
@@ -441,7 +417,7 @@ def _track(
         # Edges of the first pixel are at -0.5 and 0.5; a box without an area is none.
         pixels = np.where((sides > 0).all(axis=0), low + sides / 2 - 0.5, np.nan).T
         doubts += (f"{name}: the middles of its boxes are taken, of {', '.join(box[0] + box[1])}",)
-    elif pair == ("x", "y") and np.nanstd(columns.get("z", 0.0)) > 0:
+    elif pair == ["x", "y"] and np.nanstd(columns.get("z", 0.0)) > 0:
         raise ValueError(
             "must be the track of one camera, got x, y and z: a path in space needs no cameras, "
             "give it to vl.discover(t, x)"
@@ -450,7 +426,7 @@ def _track(
         pixels = np.column_stack([columns[key] for key in pair])
     else:
         raise ValueError(f"must have columns u and v, got {', '.join(columns) or 'none':.80}")
-    if of_world := of_world and pair == ("x", "y"):
+    if of_world := of_world and pair == ["x", "y"]:
         if np.nanmin(pixels, initial=0) < 0:
             raise ValueError(
                 "must hold pixels from the upper left corner, got x and y of Tracker or Kinovea "
@@ -471,7 +447,7 @@ def _track(
         doubts += (f"{name}: {marks} in {unset.sum()} of {len(unset)} rows is taken for not seen",)
     pixels[unset | ~np.isfinite(pixels).all(axis=1)] = np.nan
     # Tracker, which writes times as well, counts from the corner of the first pixel.
-    if pair == ("pixelx", "pixely") or (of_world and "t" in columns):
+    if pair == ["pixelx", "pixely"] or (of_world and "t" in columns):
         pixels -= 0.5
     frames = columns.get("frame")
     clock = next((match for key in columns if (match := _TIME.fullmatch(key))), None)
@@ -510,9 +486,9 @@ def _seen(columns: Mapping[str, Floats]) -> Bools:
     for key, values in columns.items():
         if key == "likelihood":
             seen &= values >= 0.6  # DeepLabCut's own limit
-        elif key in _SEEN:
+        elif key in _WORDS["seen"]:
             seen &= ~(values <= 0)
-        elif key in _HIDDEN:
+        elif key in _WORDS["hidden"]:
             seen &= ~(values > 0)
     return seen
 
