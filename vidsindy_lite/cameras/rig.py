@@ -96,10 +96,7 @@ _MARKS = dict.fromkeys(_KEYS["ignored"], True) | dict.fromkeys(_KEYS["used"], Fa
 # Keys that say which lens it is, ...
 _LENS = re.compile(r"model|lens|projection_?type|^camera_?type")
 # ... and parts of the names of those that are none of ours.
-_OTHERS = re.compile(
-    "fish|equi|kannala|kb4|omni|mei|spher|ucm|unified|fov|atan|scaramuzza|ocam|division|thin|tilt|"
-    "ortho|panor|theta|stereograph"
-)
+_OTHERS = re.compile("|".join(_KEYS["others"]))
 _LENSES = f"of {', '.join(LENS)}"
 # Keys that are read, and those that change nothing of what a camera sees.
 _KNOWN = {*chain(_KEYS["known"], _MARKS, *_KEYS["sides"], *_NAMES.values())}
