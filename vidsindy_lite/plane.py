@@ -7,7 +7,7 @@ one before it, the simplest is taken that the data bear: forces that are the sam
 """
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -35,7 +35,7 @@ from .pipeline import (
     with_law,
     without_wild,
 )
-from .vision import Hint, carry, check_detector, frame_clock, read_tracks, video_info
+from .vision import Hint, TrackFile, carry, check_detector, frame_clock, read_tracks, video_info
 
 MARK = 1.0  #: Standard error of a mark that is set by hand, in pixels.
 #: What pulls at all bodies, in metres a second squared, and by how much it differs on earth.
@@ -177,7 +177,16 @@ def discover_from_video(
             f"{'hint and detector' if table else 'individual'}: must be given with a "
             f"{'film' if table else 'text file of tracks'}, got {name}"
         )
-    size, look = _table(path, fps, individual) if table else _film(path, fps, hint, detector)
+    if table:  # its picture is the smallest one that holds the track
+        track = _table(path, fps, individual)
+        width, height = (int(x) + 1 for x in np.fmax.reduce(track.pixels, axis=0, initial=0.0))
+    else:
+        shot = video_info(path)
+        if fps is None and not shot.fps:
+            raise ValueError(f"fps: must be given, as {name} states no frame rate")
+        rate = shot.fps if fps is None else check_positive("fps", fps)
+        width, height = shot.size
+    size = width, height
     marks, places, measured = four_places(length, up, corners, size, within=not table)
     if table:  # the picture holds the marks, too
         width, height = np.maximum(size, marks.max(axis=0).astype(int) + 1).tolist()
@@ -194,7 +203,10 @@ def discover_from_video(
         scale_error=error, image_size=size,
     )  # fmt: skip
     rig = Rig((camera,), note=f"the plane of the motion, places in {unit}, times in s{scale}")
-    t, pixels, first, warnings = look()
+    if not table:
+        (seen,) = tracked(path, shot.frames, detector, hint)
+        track = TrackFile(name, seen.pixels, frame_clock(path) / rate, seen.warnings)
+    t, pixels, first, warnings = np.asarray(track.t), track.pixels, track.start, track.warnings
     if frames is not None:
         pixels = _between(frames, pixels, first)
     check_found([pixels], [name], 1, [warnings])
@@ -209,7 +221,7 @@ def discover_from_video(
         seen = Observation(
             tracks=(pixels,), rig=noted(rig, left_out, *cuts),
             lags=Lags(zero, zero + 1, zero, 0.0, clocks=(clock,)),
-            t=t, x=x @ SPACE, systematic=modes @ SPACE, warnings=tuple(warnings),
+            t=t, x=x @ SPACE, systematic=modes @ SPACE, warnings=warnings,
         )  # fmt: skip
         found = PlaneDiscovery(**vars(with_law(seen, [name], asked)), unit=unit)
         if found.leaning:
@@ -240,39 +252,15 @@ def discover_from_video(
     return found
 
 
-#: Times, pixels, the number of the first frame, and doubts.
-Seen = tuple[Floats, Floats, int, Sequence[str]]
-
-
-def _film(
-    path: Path, fps: float | None, hint: Hint | None, detector: str | os.PathLike
-) -> tuple[tuple[int, int], Callable[[], Seen]]:
-    """The size of a film's pictures, and what tracks the target in it."""
-    shot = video_info(path)
-    if fps is None and not shot.fps:
-        raise ValueError(f"fps: must be given, as {path.name} states no frame rate")
-    rate = shot.fps if fps is None else check_positive("fps", fps)
-
-    def look() -> Seen:
-        (seen,) = tracked(path, shot.frames, detector, hint)
-        return frame_clock(path) / rate, seen.pixels, 0, seen.warnings
-
-    return shot.size, look
-
-
-def _table(
-    path: Path, fps: float | None, individual: str | None
-) -> tuple[tuple[int, int], Callable[[], Seen]]:
-    """The size of the smallest picture that holds a track in a text file, and what gives it."""
+def _table(path: Path, fps: float | None, individual: str | None) -> TrackFile:
+    """The track of one camera in a text file, with the times that are given or stated."""
     read = read_tracks(path, individual)
     if len(read) > 1 or read[0].upwards:
         got = f"{len(read)} cameras" if len(read) > 1 else "one that counts v from below"
         told = f"path: {path.name} must hold the track of one camera, v downwards, got {got}"
         raise ValueError(told)
     (track,), (times, doubts) = read, times_of(read, None, fps)
-    width, height = (int(most) + 1 for most in np.fmax.reduce(track.pixels, axis=0, initial=0.0))
-    t, warnings = np.array(times, float)[0], (*track.warnings, *doubts)
-    return (width, height), lambda: (t, track.pixels, track.start, warnings)
+    return replace(track, t=np.array(times, float)[0], warnings=(*track.warnings, *doubts))
 
 
 def _between(frames: Sequence[int], pixels: Floats, start: int) -> Floats:
