@@ -25,7 +25,6 @@ INSTANTS = 300  #: At which views are compared before all frames are.
 OVERLAP = 0.5  #: Share of the shorter of two videos that both must show.
 _FARTHEST = 1e9  # frames by which a video may start later; and ...
 _FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
-_UNLIKE = 20.0  # times as long as another's that a track's frames may last by its times
 
 
 @dataclass(frozen=True)
@@ -362,7 +361,8 @@ class Clock:
             for i, (one, track) in enumerate(zip(t, tracks, strict=True))
         ]
         usual = np.array([np.median(np.diff(times)) if len(times) > 1 else 1 for times in stated])
-        if usual.max() > _UNLIKE * usual.min():
+        # So many times as long as another's a track's frames may last.
+        if usual.max() > 20.0 * usual.min():
             i = np.abs(np.log(usual / np.median(usual))).argmax()
             steps = ", ".join(f"{step:.3g}" for step in usual)
             raise ValueError(

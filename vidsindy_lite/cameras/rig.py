@@ -93,10 +93,8 @@ _KEYS: dict[str, Any] = _TEXTS["keys"]
 _NAMES: dict[str, list[str]] = _KEYS["names"]
 # Keys that mark a camera as one to be left out: if they are set, or if they are not.
 _MARKS = dict.fromkeys(_KEYS["ignored"], True) | dict.fromkeys(_KEYS["used"], False)
-# Keys that say which lens it is, ...
+# Keys that say which lens it is.
 _LENS = re.compile(r"model|lens|projection_?type|^camera_?type")
-# ... and parts of the names of those that are none of ours.
-_OTHERS = re.compile("|".join(_KEYS["others"]))
 _LENSES = f"of {', '.join(LENS)}"
 # Keys that are read, and those that change nothing of what a camera sees.
 _KNOWN = {*chain(_KEYS["known"], _MARKS, *_KEYS["sides"], *_NAMES.values())}
@@ -716,7 +714,8 @@ def _check_lens(key: str, value: Any, name: str, warnings: list[str]) -> None:
     named = f"{key} {value}".lower()
     if key == "rotation_count":
         raise ValueError(f"{name}{key}: must be 0, got {shown(value)}")
-    if np.isscalar(value) and ("fisheye" in key or (_LENS.search(key) and _OTHERS.search(named))):
+    other = _LENS.search(key) and any(part in named for part in _KEYS["others"])
+    if np.isscalar(value) and ("fisheye" in key or other):
         raise ValueError(f"{name}{key}: must be none but of a lens {_LENSES}, got {shown(value)}")
     alone = np.isscalar(value) and re.fullmatch(r"[kp][1-6]|skew", key)  # P1 may be a matrix
     if alone or ("dist" in key and key not in _KNOWN):

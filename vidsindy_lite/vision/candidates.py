@@ -45,7 +45,6 @@ GAP = 15  # frames that a path may miss
 TOLD = 20.0  # quality of a candidate that somebody points at
 _SIDE = 40  # pixels of a patch
 _WIDE = 2.6  # width of the patch, in widths of the target
-_BINS = 4096  # of a histogram: 16 levels a colour
 
 
 class Spot(NamedTuple):
@@ -506,7 +505,7 @@ class Appearance:
         inner, outer = (radius**2).sum(axis=0) < 0.7, (radius > 1.25).any(axis=0)
         bins = _bins(patch)
         new = (np.conj(z) * self._aim, (np.abs(z) ** 2).sum(axis=0), *(
-            np.bincount(bins[m], minlength=_BINS) / m.sum() for m in (inner, outer)))  # fmt: skip
+            np.bincount(bins[m], minlength=16**3) / m.sum() for m in (inner, outer)))  # fmt: skip
         known = self._cross, self._power, self._own, self._around
         self._cross, self._power, self._own, self._around = (
             (1 - rate) * a + rate * b for a, b in zip(known, new, strict=True)
@@ -556,6 +555,7 @@ class Appearance:
 
 
 def _bins(image: Image) -> Ints:
+    """Which of the bins of a histogram each pixel is in: of 16 levels of each colour."""
     q = (image >> 4).astype(np.int32)
     return np.asarray((q[..., 0] << 8) | (q[..., 1] << 4) | q[..., 2])
 

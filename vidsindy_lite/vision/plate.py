@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .video import Reel
 
-_UNEVEN = 0.12  # share by which a shadow may darken the colours of a pixel unlike each other
 _STRIP = 64  # rows of an image that are sorted at once: what they need stays in the cache
 
 
@@ -38,7 +37,8 @@ def shadowed(now: Floats | Floats32 | Image, ground: Floats | Floats32) -> Bools
     r, g, b = np.moveaxis((now + 4.0) / (ground + 4.0), -1, 0)  # faster than along a short axis
     mean = (r + g + b) / 3
     apart = np.maximum(np.maximum(r, g), b) - np.minimum(np.minimum(r, g), b)
-    return np.asarray((mean > 0.35) & (mean < 0.95) & (apart < _UNEVEN * mean))
+    # By that share a shadow may darken the colours of a pixel unlike each other.
+    return np.asarray((mean > 0.35) & (mean < 0.95) & (apart < 0.12 * mean))
 
 
 def relit(image: Image, factor: Floats32) -> Floats32:
