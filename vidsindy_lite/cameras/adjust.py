@@ -53,20 +53,9 @@ from scipy.ndimage import minimum_filter1d
 from scipy.special import chdtri, gammaincinv
 
 from ..arrays import Bools, Floats
+from . import models
 from .clocks import Footage
-from .models import (
-    ROUNDING,
-    SETTLED,
-    TRIMMED,
-    USUAL,
-    Camera,
-    OrthographicCamera,
-    PerspectiveCamera,
-    at_once,
-    frozen,
-    intersect,
-    trimmed,
-)
+from .models import TRIMMED, Camera, OrthographicCamera, PerspectiveCamera
 from .rig import FINE, GROSS, Rig, decimals, residuals
 
 #: Which components of the vector belong to what.
@@ -134,16 +123,16 @@ def changed(camera: Camera, change: Floats) -> Camera:
     values: dict[str, Any] = {}
     if part["normal"].any():
         normal = camera.normal + part["normal"] @ camera.rows
-        values["normal"] = frozen(normal / np.linalg.norm(normal))
+        values["normal"] = models.frozen(normal / np.linalg.norm(normal))
     if part["position"].any() and camera.position is not None:
         axes = np.vstack((camera.rows, camera.normal))
-        values["position"] = frozen(camera.position + part["position"] @ axes)
+        values["position"] = models.frozen(camera.position + part["position"] @ axes)
     if part["principal point"].any():
-        values["principal_point"] = frozen(camera.centre + part["principal point"])
+        values["principal_point"] = models.frozen(camera.centre + part["principal point"])
     if part["distortion"].any() and isinstance(camera, PerspectiveCamera):
-        before = np.zeros(USUAL) if camera.distortion is None else camera.distortion
+        before = np.zeros(models.USUAL) if camera.distortion is None else camera.distortion
         step = np.pad(part["distortion"], (0, len(before) - len(part["distortion"])))
-        values["distortion"] = frozen(before + step)
+        values["distortion"] = models.frozen(before + step)
     if part["readout"].any():
         values["readout"] = float(np.clip(camera.readout + part["readout"][0], -1, 1))
     moved = camera.moved(**values) if values else camera
@@ -209,7 +198,8 @@ class Adjustment:
 
     def left(self, share: float = TRIMMED) -> float:
         """The worst camera's residual that one frame in ten exceeds, pixels; see `trimmed`."""
-        return max(trimmed(part, share) for part in np.split(self.misses, len(self.start), axis=1))
+        views = np.split(self.misses, len(self.start), axis=1)
+        return max(models.trimmed(view, share) for view in views)
 
     @cached_property
     def noise(self) -> float:
@@ -222,9 +212,9 @@ class Adjustment:
         freedom = np.isfinite(self.misses).sum(axis=1) - 3
         squares = np.nansum(self.misses**2, axis=1)[freedom > 0]
         if not squares.size:
-            return ROUNDING
+            return models.ROUNDING
         expected = 2 * gammaincinv(freedom[freedom > 0] / 2, 0.5)
-        return max(float(np.sqrt(np.median(squares / expected))), ROUNDING)
+        return max(float(np.sqrt(np.median(squares / expected))), models.ROUNDING)
 
     @cached_property
     def weights(self) -> Floats:
@@ -382,7 +372,7 @@ def adjust(
     """
     change = np.zeros(errors.shape) if begin is None else begin
     state = Adjustment(footage, tuple(start), errors, change, np.zeros((0, 3)))
-    points = intersect(state.cameras, at_once(state.cameras, state.footage.aligned))
+    points = models.intersect(state.cameras, models.at_once(state.cameras, state.footage.aligned))
     seen = points[np.isfinite(points).all(axis=1)]
     reach = (float(np.sqrt(np.mean(np.var(seen, axis=0)))) if len(seen) else 1.0) or 1.0
     state = replace(state, points=points, reach=reach)
@@ -394,7 +384,7 @@ def adjust(
             break
         # A frame at the end of a video may come and go with a lag, for ever.
         back = (np.abs(moved.change - earlier) <= _PROBE * state.unit).all()
-        enough = max(SETTLED, (_IN_TIME if state.timed else _ENOUGH) * moved.noise)
+        enough = max(models.SETTLED, (_IN_TIME if state.timed else _ENOUGH) * moved.noise)
         still = step <= enough or (state.timed and back)
         moved.settled = bool(still and moved.noise >= state.noise * (1 - 1e-3))
         moved.steps, earlier, state = state.steps + 1, state.change, moved

@@ -32,18 +32,10 @@ from scipy.special import chdtri
 
 from ..arrays import Floats, Ints
 from ..checks import check_instance, check_items
+from . import models
 from .adjust import DRIFT, LAG, PARTS, adjust, known_to
 from .clocks import Footage, Lags
-from .models import (
-    ROUNDING,
-    Camera,
-    all_orthographic,
-    epipolar_lines,
-    epipolar_rows,
-    independent,
-    intersect,
-    missed,
-)
+from .models import Camera, missed
 from .rig import Rig, check_calibrated, check_seen, check_views
 from .unmeasured import posed
 
@@ -71,8 +63,8 @@ def _epipolar(tracks: Sequence[Floats], cameras: Sequence[Camera], i: int) -> Eq
     free = [not camera.is_calibrated] * 2 + [not camera.is_placed] * 2 + [True] * len(loose)
     parts = [(np.zeros((0, len(free))), np.zeros(0), np.zeros(0, int))]
     for j in others:
-        lines = epipolar_lines(cameras[j], tracks[j], camera)
-        design, target = epipolar_rows(lines, camera, tracks[i])
+        lines = models.epipolar_lines(cameras[j], tracks[j], camera)
+        design, target = models.epipolar_rows(lines, camera, tracks[i])
         constants = np.tile(np.equal(loose, j), (len(design), 1))
         moves = np.hstack((lines[0][:, ::-1] * [-1, 1], constants))
         design = np.hstack((design, camera.image_size[0] / 2 * moves))
@@ -86,11 +78,11 @@ def _without_outliers(every: Equations, scale: float) -> Equations:
     """The frames of which the fit of the least absolute misses, in pixels, misses none by far."""
     missed = np.ones(len(every.target))
     for _ in range(20):
-        root = np.sqrt(np.maximum(missed, ROUNDING))
+        root = np.sqrt(np.maximum(missed, models.ROUNDING))
         solution = np.linalg.lstsq(every.design / root[:, None], every.target / root)[0]
         missed = np.abs(every.design @ solution - every.target) / scale
     # Eight robust standard deviations.
-    limit = max(8.0 * 1.4826 * np.median(missed), ROUNDING) if len(missed) else 0.0
+    limit = max(8.0 * 1.4826 * np.median(missed), models.ROUNDING) if len(missed) else 0.0
     good = ~np.isin(every.frames, every.frames[missed > limit])
     return Equations(every.design[good], every.target[good], every.frames[good])
 
@@ -201,13 +193,13 @@ def check_learnable(rig: Rig) -> None:
             f"others, got none of {len(rig.cameras)}"
         )
     loose = [i for i, camera in enumerate(rig.cameras) if not camera.is_placed]
-    if loose and not all_orthographic(rig.cameras):
+    if loose and not models.all_orthographic(rig.cameras):
         raise ValueError(
             "rig: all positions must be given if a camera is perspective, got none of "
             f"{_names(loose)}"
         )
     placed = [camera for camera in rig.cameras if camera.is_placed]
-    if loose and not independent(placed):
+    if loose and not models.independent(placed):
         raise ValueError(
             "rig: the positions of two cameras with independent normals must be given to learn "
             f"those of {_names(loose)}, got {len(placed)}"
@@ -246,9 +238,9 @@ def learn_cameras_eq4(tracks: Sequence[Floats], rig: Rig) -> Rig:
         raise ValueError(
             f"rig: Eq. (4) needs all positions, got none of {_names(loose)}; use learn_cameras"
         )
-    if not all_orthographic(cameras):
+    if not models.all_orthographic(cameras):
         raise ValueError("rig: Eq. (4) needs orthographic cameras, got a perspective one")
-    if not independent([cameras[i] for i in unknown]):
+    if not models.independent([cameras[i] for i in unknown]):
         raise ValueError(
             "rig: Eq. (4) needs two independent normals among the uncalibrated cameras, got "
             f"{[cameras[i].normal.tolist() for i in unknown]}; use learn_cameras"
@@ -325,7 +317,7 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     views, seen = check_views(tracks, rig), check_seen(tracks, rig)
     errors = np.array([known_to(camera) for camera in rig.cameras])
     start = closed_form(views, rig.cameras)
-    if not np.isfinite(intersect(start, views)).any():
+    if not np.isfinite(models.intersect(start, views)).any():
         raise ValueError(
             "rig: the lines of sight must meet in front of the cameras, got none that do (do two "
             "views share frames, and does each normal point from the scene to its camera?)"
@@ -469,7 +461,7 @@ def tracking_errors(
     if len(views[0]) < 2:
         raise ValueError(f"tracks: must have two frames or more, got {[*map(len, views)]}")
     if places is None:
-        places = partial(intersect, rig.cameras)  # of views that are at once already
+        places = partial(models.intersect, rig.cameras)  # of views that are at once already
     left = np.hstack(missed(rig.cameras, views))
     count = left.shape[1]
     left = np.abs(left[np.isfinite(left)])

@@ -61,20 +61,8 @@ from ..checks import (
     shown,
 )
 from ..storage import TREES, check_file, read_arrays, read_text, read_tree, reading, write_file
-from .models import (
-    LENS,
-    MODELS,
-    ROUNDING,
-    Camera,
-    OrthographicCamera,
-    PerspectiveCamera,
-    at_once,
-    independent,
-    intersect,
-    missed,
-    rotation_to_z,
-    trimmed,
-)
+from . import models
+from .models import Camera, OrthographicCamera, PerspectiveCamera
 
 #: Pixels by which a good rig misses at most one frame in ten; even whole-pixel tracks are missed by
 #: less than half of that.
@@ -95,7 +83,7 @@ _NAMES: dict[str, list[str]] = _KEYS["names"]
 _MARKS = dict.fromkeys(_KEYS["ignored"], True) | dict.fromkeys(_KEYS["used"], False)
 # Keys that say which lens it is.
 _LENS = re.compile(r"model|lens|projection_?type|^camera_?type")
-_LENSES = f"of {', '.join(LENS)}"
+_LENSES = f"of {', '.join(models.LENS)}"
 # Keys that are read, and those that change nothing of what a camera sees.
 _KNOWN = {*chain(_KEYS["known"], _MARKS, *_KEYS["sides"], *_NAMES.values())}
 
@@ -140,7 +128,7 @@ class Rig:
         if not cameras:
             raise ValueError("cameras: must be one or more, got none")
         self._check_measured()
-        if len(cameras) > 1 and self.is_measured and not independent(cameras):
+        if len(cameras) > 1 and self.is_measured and not models.independent(cameras):
             kind = "normal" if isinstance(cameras[0], OrthographicCamera) else "position"
             raise ValueError(
                 f"cameras: must have at least two independent {kind}s, got only "
@@ -344,7 +332,7 @@ def reconstruct(tracks: Sequence[Floats], rig: Rig) -> Floats:
         If the tracks do not match the rig or a camera is not calibrated.
     """
     check_calibrated("rig", rig)
-    return intersect(rig.cameras, check_views(tracks, rig))
+    return models.intersect(rig.cameras, check_views(tracks, rig))
 
 
 def residuals(tracks: Sequence[Floats], rig: Rig) -> list[Floats]:
@@ -370,7 +358,7 @@ def residuals(tracks: Sequence[Floats], rig: Rig) -> list[Floats]:
         If the tracks do not match the rig or a camera is not calibrated.
     """
     check_calibrated("rig", rig)
-    return missed(rig.cameras, check_views(tracks, rig))
+    return models.missed(rig.cameras, check_views(tracks, rig))
 
 
 def disagreement(tracks: Sequence[Floats], rig: Rig) -> list[float]:
@@ -388,7 +376,7 @@ def disagreement(tracks: Sequence[Floats], rig: Rig) -> list[float]:
     list of float
         Pixels; zero for a camera that takes part in no point.
     """
-    return [trimmed(part) for part in residuals(tracks, rig)]
+    return [models.trimmed(part) for part in residuals(tracks, rig)]
 
 
 def without_view_outliers(tracks: Sequence[Floats], rig: Rig) -> tuple[list[Floats], Bools]:
@@ -406,7 +394,7 @@ def without_view_outliers(tracks: Sequence[Floats], rig: Rig) -> tuple[list[Floa
     views = check_views(tracks, rig)
 
     def off(views: Sequence[Floats]) -> Floats:
-        return np.fmax.reduce([np.hypot(*part.T) for part in missed(rig.cameras, views)])
+        return np.fmax.reduce([np.hypot(*part.T) for part in models.missed(rig.cameras, views)])
 
     whole, outliers = off(views), np.zeros((len(views[0]), len(views)), dtype=bool)
     limit = max(8.0 * float(np.nanmedian(whole)), GROSS)
@@ -436,7 +424,7 @@ def check_views(tracks: Sequence[Floats], rig: Rig) -> list[Floats]:
     if len(set(lengths)) > 1:
         raise ValueError(f"tracks: must have the same number of frames, got {lengths}")
     whole = [np.where(np.isfinite(t).all(axis=1, keepdims=True), t, np.nan) for t in checked]
-    return at_once(rig.cameras, whole)
+    return models.at_once(rig.cameras, whole)
 
 
 def check_calibrated(name: str, rig: Rig) -> None:
@@ -525,7 +513,7 @@ def _by_hand(known: dict[str, Any], model: str) -> dict[str, Any]:
         known["scale"] = 2 * np.tan(np.deg2rad(across) / 2) / width
         leans = check_number("roll", 0.0 if roll is None else roll)
         if "normal" in known:
-            x, y = rotation_to_z(known["normal"])[:2, 2]
+            x, y = models.rotation_to_z(known["normal"])[:2, 2]
             known["angle"] = float(np.arctan2(x, y) + np.deg2rad(leans))
     elif roll is not None:
         raise ValueError("roll: must be given with a field_of_view")
@@ -545,15 +533,15 @@ def _from_table(index: int, table: object) -> Camera:
         known = dict(table)
         model = known.pop("model", OrthographicCamera.model)
         known.pop("target", None)  # for the tracker
-        check_choice("model", model, [*MODELS])
-        keys = ["model", "target", *(part.name for part in fields(MODELS[model])), *_LOOKS]
+        check_choice("model", model, [*models.MODELS])
+        keys = ["model", "target", *(part.name for part in fields(models.MODELS[model])), *_LOOKS]
         for key in table:
             if key not in keys:
                 raise ValueError(f"{key}: must be one of {', '.join(keys)}")
         known = _by_hand(known, model)
         if "normal" not in known and (model == OrthographicCamera.model or "position" in known):
             raise ValueError(f"normal: must be given, got keys {', '.join(table)}")
-        return MODELS[model](**known)
+        return models.MODELS[model](**known)
     except ValueError as error:
         raise ValueError(f"camera {index}: {error}") from error
 
@@ -754,7 +742,7 @@ def _decomposed(table: dict[str, Any], name: str, warnings: list[str]) -> Iterat
         told = f"{skew:.3g} pixels at the edge of the image"
         if skew > 5.0:  # pixels at the edge of the image, which are no camera's
             raise ValueError(f"P: must be of a camera with square corners, got a skew of {told}")
-        if skew > ROUNDING:
+        if skew > models.ROUNDING:
             warnings.append(
                 f"{name or f'camera [{i}]: '}its pixels are skew, by {told}, which is left out"
             )
@@ -772,7 +760,7 @@ def _camera(table: dict[str, Any]) -> PerspectiveCamera:
     if inner[0, 0] <= 0 or inner[1, 1] <= 0 or np.abs(inner[2] - [0, 0, 1]).max() > 1e-12:
         raise ValueError(f"K: must be [[fx, s, cx], [0, fy, cy], [0, 0, 1]], got {inner.tolist()}")
     skew = abs(inner[0, 1] / inner[1, 1]) * inner[1, 2]
-    if skew > ROUNDING:
+    if skew > models.ROUNDING:
         raise ValueError(f"K: must have no skew, got {inner[0, 1]:g}")
     middle, size = inner[:2, 2], table["size"]
     # What P leads to may lie anywhere, and matters to no lens.
