@@ -18,23 +18,11 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.polynomial.polynomial import polyfit, polyval
 
+from . import pipeline
 from .arrays import Floats
 from .cameras import Lags, OrthographicCamera, Rig
 from .checks import check_array, check_number, check_path, check_positive, check_vector, shown
-from .pipeline import (
-    Observation,
-    VideoDiscovery,
-    check_found,
-    directions,
-    kinks,
-    law_options,
-    noted,
-    roughness,
-    times_of,
-    tracked,
-    with_law,
-    without_wild,
-)
+from .pipeline import Observation, VideoDiscovery
 from .vision import Hint, TrackFile, carry, check_detector, frame_clock, read_tracks, video_info
 
 MARK = 1.0  #: Standard error of a mark that is set by hand, in pixels.
@@ -90,7 +78,7 @@ class PlaneDiscovery(VideoDiscovery):
         And where that may be how the telephone was held.
         """
         there = np.isfinite(self.x[:, 0])
-        axes = directions(self.t[there], self.x[there, :2])
+        axes = pipeline.directions(self.t[there], self.x[there, :2])
         off = float(np.arctan2(*np.abs(axes[0])))
         return float(np.rad2deg(off)) if len(axes) == 1 and off > SURE * HELD else 0.0
 
@@ -161,7 +149,7 @@ def discover_from_video(
     >>> print(found, found.g)
     """
     check_detector(detector)
-    asked = law_options(degree, None, order, "learn", "data", seed, progress, 2)
+    asked = pipeline.law_options(degree, None, order, "learn", "data", seed, progress, 2)
     if length_error is not None and length is None and corners is None:
         raise ValueError("length_error: must be given with length or corners, got neither")
     share = 0.01 if length_error is None else check_number("length_error", length_error)
@@ -204,13 +192,13 @@ def discover_from_video(
     )  # fmt: skip
     rig = Rig((camera,), note=f"the plane of the motion, places in {unit}, times in s{scale}")
     if not table:
-        (seen,) = tracked(path, shot.frames, detector, hint)
+        (seen,) = pipeline.tracked(path, shot.frames, detector, hint)
         track = TrackFile(name, seen.pixels, frame_clock(path) / rate, seen.warnings)
     t, pixels, first, warnings = np.asarray(track.t), track.pixels, track.start, track.warnings
     if frames is not None:
         pixels = _between(frames, pixels, first)
-    check_found([pixels], [name], 1, [warnings])
-    pixels, left_out = without_wild(pixels, name)
+    pipeline.check_found([pixels], [name], 1, [warnings])
+    pixels, left_out = pipeline.without_wild(pixels, name)
     zero, clock = np.zeros(1), np.arange(len(t), dtype=float)
 
     def law_of(pixels: Floats, *cuts: str) -> PlaneDiscovery:
@@ -219,15 +207,16 @@ def discover_from_video(
         known = slice(3 if corners is None else 1) if measured else slice(0)
         modes = np.stack([error * x, *_tilts(camera, pixels, middle)])[known]
         seen = Observation(
-            tracks=(pixels,), rig=noted(rig, left_out, *cuts),
+            tracks=(pixels,), rig=pipeline.noted(rig, left_out, *cuts),
             lags=Lags(zero, zero + 1, zero, 0.0, clocks=(clock,)),
             t=t, x=x @ SPACE, systematic=modes @ SPACE, warnings=warnings,
         )  # fmt: skip
-        found = PlaneDiscovery(**vars(with_law(seen, [name], asked)), unit=unit)
+        found = PlaneDiscovery(**vars(pipeline.with_law(seen, [name], asked)), unit=unit)
         if found.leaning:
             line = f"along a line {found.leaning:.0f} degrees off the vertical: something bears it"
             law = replace(found.discovery, force="pull")
-            found = replace(found, rig=noted(found.rig, f"{line}, its pull is no g"), discovery=law)
+            with_line = pipeline.noted(found.rig, f"{line}, its pull is no g")
+            found = replace(found, rig=with_line, discovery=law)
         contradicted = _contradicted(found, up is not None or corners is not None, corners is None)
         if found.warnings != seen.warnings and frames is None:
             contradicted.append(
@@ -259,7 +248,7 @@ def _table(path: Path, fps: float | None, individual: str | None) -> TrackFile:
         got = f"{len(read)} cameras" if len(read) > 1 else "one that counts v from below"
         told = f"path: {path.name} must hold the track of one camera, v downwards, got {got}"
         raise ValueError(told)
-    (track,), (times, doubts) = read, times_of(read, None, fps)
+    (track,), (times, doubts) = read, pipeline.times_of(read, None, fps)
     return replace(track, t=np.array(times, float)[0], warnings=(*track.warnings, *doubts))
 
 
@@ -280,7 +269,7 @@ def _unhit(pixels: Floats, start: int) -> tuple[Floats, str]:
 
     It starts at some frame. Parts are long enough for a law if they hold ten frames.
     """
-    turns = kinks(pixels)
+    turns = pipeline.kinks(pixels)
     ends = np.concatenate([[-1], turns, [len(pixels)]])
     longest = int(np.diff(ends).argmax())
     first, last = int(ends[longest]) + 1, int(ends[longest + 1]) - 1
@@ -303,7 +292,7 @@ def _flight(pixels: Floats, start: int) -> tuple[Floats, str]:
     is farther from the parabola than the part is long: a drag, or a plane askew, bends it by less.
     """
     seen = np.flatnonzero(np.isfinite(pixels).all(axis=1))
-    limit = 4 * float(np.median(roughness(seen, pixels))) if len(seen) else 0.0
+    limit = 4 * float(np.median(pipeline.off_neighbours(seen, pixels))) if len(seen) else 0.0
     for count in range(len(seen), 9, -1):
         parabolas = np.linalg.qr(np.vander(np.arange(count), 3))[0]
         parts = sliding_window_view(pixels, count, axis=0)
