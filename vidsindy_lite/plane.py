@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.polynomial.polynomial import polyfit, polyval
 
 from . import pipeline
@@ -286,27 +285,29 @@ def _unhit(pixels: Floats, start: int) -> tuple[Floats, str]:
 
 
 def _flight(pixels: Floats, start: int) -> tuple[Floats, str]:
-    """The longest part of a track that is a parabola to within its noise, and what to say of it.
+    """The part of a track that goes farthest on a parabola, to its noise, and what to say of it.
 
     It starts at some frame. What comes before and after is another motion, as that of a hand, if it
-    is farther from the parabola than the part is long: a drag, or a plane askew, bends it by less.
+    is off the parabola by half as much as the part goes: a drag, or a plane askew, bends it less.
     """
     seen = np.flatnonzero(np.isfinite(pixels).all(axis=1))
-    limit = 4 * float(np.median(pipeline.off_neighbours(seen, pixels))) if len(seen) else 0.0
-    for count in range(len(seen), 9, -1):
-        parabolas = np.linalg.qr(np.vander(np.arange(count), 3))[0]
-        parts = sliding_window_view(pixels, count, axis=0)
-        left = np.abs(parts - parts @ parabolas @ parabolas.T).max(axis=(1, 2))
-        k = int(np.where(np.isfinite(left), left, np.inf).argmin())
-        if left[k] <= limit:
-            own, first, last = np.arange(k, k + count), start + k, start + k + count - 1
-            along = polyval(seen - k, polyfit(own - k, pixels[own], 2)).T
-            apart = np.linalg.norm(along - pixels[seen], axis=1).max()
-            if apart < np.linalg.norm(np.ptp(pixels[own], axis=0)):
+    noise, first, best = np.median(pipeline.off_neighbours(seen, pixels)), 0, (0.0, 0.0, 0, 0)
+    for last in range(len(seen)):
+        while last - first >= 9:
+            own = seen[first : last + 1]
+            parabola = polyfit(own - own[0], pixels[own], 2)
+            off = np.abs(polyval(seen - own[0], parabola).T - pixels[seen]).max(axis=1)
+            if off[first : last + 1].max() <= 4 * noise:
+                reach = float(np.linalg.norm(np.ptp(pixels[own], axis=0)))
+                best = max(best, (reach, float(off.max()), *own[[0, -1]].tolist()))
                 break
-            told = f"it flies freely from frame {first} to {last}, which alone are counted"
-            return _between((first, last), pixels, start), told
-    return pixels, ""
+            first += 1
+    reach, off_rest, begins, ends = best
+    if off_rest <= reach / 2:
+        return pixels, ""
+    begins, ends = start + begins, start + ends
+    told = f"it flies freely from frame {begins} to {ends}, which alone are counted"
+    return _between((begins, ends), pixels, start), told
 
 
 def _let_go(pixels: Floats, start: int) -> tuple[Floats, str]:
