@@ -229,14 +229,16 @@ def discover_from_video(
 
     if frames is not None:
         return law_of(pixels)
-    pixels, held = _let_go(pixels, first)
-    found = law_of(pixels, held)
-    for part, told, free in (*_unhit(pixels, first), False), (*_flight(pixels, first), True):
-        if told and found.status != "ok" and not warnings:  # doubts about a track are its parts'
+    let_go, held = _let_go(pixels, first)
+    found = law_of(let_go, held)
+    for cut, whole, before in ((_unhit, let_go, held), (_flight, pixels, "")):
+        if found.status == "ok" or warnings:  # doubts about a track are those of its parts
+            break
+        if (part := cut(whole, first))[1]:
             with suppress(ValueError):  # of a part that holds too little
-                other = law_of(part, held, told)
-                flies = other.unit == "m" and other.g is not None
-                found = other if other.status == "ok" and (flies or not free) else found
+                other = law_of(part[0], before, part[1])
+                falls = cut is _unhit or (other.unit == "m" and other.g is not None)
+                found = other if other.status == "ok" and falls else found
     return found
 
 

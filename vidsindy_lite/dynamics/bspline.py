@@ -385,6 +385,8 @@ def _cross_validated(
         control[:, better] = solved[:, :d][:, better]
         # E |K e|^2 = variance tr(K K'), K = I - influence: holds where hardly anything is smoothed.
         noise[better] = np.sqrt(squares[better] / ((probes - fitted[:, d:]) ** 2).sum())
+        if (squares > n * best).all():  # and they rise from penalty to penalty: none scores less
+            break
     return control, noise
 
 
