@@ -30,8 +30,7 @@ def test_the_readme_fits_one_screen():
 
 
 def test_every_page_of_docs_can_be_reached_from_the_readme():
-    linked = set(re.findall(r"\]\(docs/(\w+)\.md\)", README))
-    assert linked == set(PAGES) - {"README"}
+    assert set(re.findall(r"\]\(docs/(\w+)\.md\)", README)) == set(PAGES) - {"README"}
 
 
 @pytest.mark.slow

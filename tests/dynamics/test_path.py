@@ -115,8 +115,7 @@ def test_a_law_that_hangs_on_the_tolerated_error_is_told(swing):
 
 def test_errors_that_last_widen_the_error_bars(swing):
     t, x = swing
-    rng = np.random.default_rng(3)
-    white = 0.02 * x.std(axis=0) * rng.standard_normal(x.shape)
+    white = 0.02 * x.std(axis=0) * np.random.default_rng(3).standard_normal(x.shape)
     smooth = np.apply_along_axis(np.convolve, 0, white, np.ones(9) / 3, "same")
     one, nine = discover(t, x + white), discover(t, x + smooth)
     assert score(nine, DUFFING).exact

@@ -132,8 +132,7 @@ def test_an_order_that_is_none():
 
 
 def test_only_velocities_by_name_make_a_second_order():
-    tied = {"x": {"vx": 1.0}, "vx": {"x": -1.0}}
-    assert PolynomialSystem.from_terms(tied).order == 2
+    assert PolynomialSystem.from_terms({"x": {"vx": 1.0}, "vx": {"x": -1.0}}).order == 2
     assert PolynomialSystem.from_terms({"x": {"y": 1.0}, "y": {"x": -1.0}}).order == 1
     assert PolynomialSystem.from_terms({"x": {"vx": 2.0}, "vx": {"x": -1.0}}).order == 1
     assert PolynomialSystem.from_terms({"x": {"vx": 1, "x": 1}, "vx": {"x": -1}}).order == 1
