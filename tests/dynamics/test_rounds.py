@@ -99,8 +99,7 @@ def test_errors_that_all_positions_share_are_passed_on():
 
 def test_what_is_on_no_circle_is_said_in_short():
     rng, t = np.random.default_rng(0), np.linspace(0, 30, 400)
-    wave = np.column_stack([t, np.sin(t)])
-    assert "hardly bends" in vl.on_circle(wave).warnings[-1]
+    assert "hardly bends" in vl.on_circle(np.column_stack([t, np.sin(t)])).warnings[-1]
     arc = np.column_stack([np.sin(0.5 * np.sin(t)), np.cos(0.5 * np.sin(t))])
     assert vl.on_circle(arc + 0.01 * rng.standard_normal((400, 2))).warnings == ()
     fine = vl.on_circle(bob(SWING) + 0.01 * rng.standard_normal((400, 3)))

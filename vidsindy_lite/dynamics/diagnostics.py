@@ -720,7 +720,7 @@ def _late(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
             found.append((gain, fewer, law.names[j], -float(size)))
     if found:
         gain, fewer, name, size = max(found)
-        when = f"{abs(size):.2g} of a step {'later' if size > 0 else 'earlier'}"
+        when = f"at least {abs(size):.2g} of a step {'later' if size > 0 else 'earlier'}"
         yield (
             f"the law has {fewer} terms less if {name} was measured {when} than its times say "
             f"(criterion {-gain:+.4g}): correct it, or give systematic="
