@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import os
 import re
-import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from fractions import Fraction
@@ -228,17 +227,28 @@ def _in_order(path: Path, files: list[Path], numbers: Floats) -> Stills:
 
 
 class _Codec(NamedTuple):
-    """How a codec is called by ffmpeg, and what it needs."""
+    """How a codec is called here by ffmpeg, and what it needs."""
 
+    suffixes: tuple[str, ...]
     encoder: str
-    suffixes: list[str]
     pixels: str  #: Format of the pixels that it codes.
-    bits: int = 0  #: Per pixel and frame, that a lossy codec may use.
+    #: Bits per pixel and frame that a lossy codec may use: as many as OpenCV grants it.
+    bits: int = 0
     options: dict[str, str] = {}  #: Of the encoder.
 
 
-_TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
-CODECS = {name: _Codec(**needs) for name, needs in _TABLES.items()}
+CODECS = {
+    # Frames from one that stands on its own to the next: a jump costs half of that.
+    "qtrle": _Codec((".mov",), "qtrle", "rgb24", options={"g": "50"}),
+    "FFV1": _Codec((".mkv", ".avi"), "ffv1", "bgr0"),
+    "mp4v": _Codec((".mp4",), "mpeg4", "yuv420p", 1),
+    "H264": _Codec((".mp4", ".mkv"), "libx264", "yuv420p"),
+    "MJPG": _Codec((".avi", ".mkv"), "mjpeg", "yuvj420p", 3),
+    "VP9": _Codec(
+        (".webm",), "libvpx-vp9", "yuv420p",
+        options={"deadline": "realtime", "cpu-used": "8", "crf": "36", "b": "0"},
+    ),
+}  # fmt: skip
 
 
 class VideoInfo(NamedTuple):
