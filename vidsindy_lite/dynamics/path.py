@@ -114,8 +114,7 @@ def first_law(problem: Problem, history: History, tolerated: float | None = None
     noise = problem.noise if problem.has_process_noise else np.maximum(problem.noise, least)
     tolerant, part = replace(problem, noise=noise), problem.part()
     if part is not problem:
-        its_own = replace(history, bar=None)  # rounds of a part are none of those that it counts
-        law = first_law(part, its_own, tolerated)
+        law = first_law(part, history, tolerated)
         collocation = tolerant.collocation(tolerant.segments())
         state = replace(law.state, control_points=fit_curves(collocation, problem.curves))
         fit = tightened(tolerant, collocation, state)
