@@ -16,11 +16,14 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.polynomial.polynomial import polyfit, polyval
+from scipy.special import fdtri
 
 from . import pipeline
-from .arrays import Floats
+from .arrays import Floats, Ints
 from .cameras import Lags, OrthographicCamera, Rig
 from .checks import check_array, check_number, check_path, check_positive, check_vector, shown
+from .dynamics.collocation import CLEANEST
+from .dynamics.data import inflation
 from .pipeline import Observation, VideoDiscovery
 from .vision import Hint, TrackFile, carry, check_detector, frame_clock, read_tracks, video_info
 
@@ -231,13 +234,15 @@ def discover_from_video(
         return law_of(pixels)
     let_go, held = _let_go(pixels, first)
     found = law_of(let_go, held)
-    for cut, whole, before in ((_unhit, let_go, held), (_flight, pixels, "")):
+    for flies, before in ((False, held), (True, "")):
         if found.status == "ok" or warnings:  # doubts about a track are those of its parts
             break
-        if (part := cut(whole, first))[1]:
+        places = carry(to_plane, pixels)
+        part, told = _flight(pixels, first, places) if flies else _unhit(let_go, first)
+        if told:
             with suppress(ValueError):  # of a part that holds too little
-                other = law_of(part[0], before, part[1])
-                falls = cut is _unhit or (other.unit == "m" and other.g is not None)
+                other = law_of(part, before, told)
+                falls = not flies or (other.unit == "m" and other.g is not None)
                 found = other if other.status == "ok" and falls else found
     return found
 
@@ -286,30 +291,46 @@ def _unhit(pixels: Floats, start: int) -> tuple[Floats, str]:
     return _between((first, last), pixels, start), told
 
 
-def _flight(pixels: Floats, start: int) -> tuple[Floats, str]:
+def _flight(pixels: Floats, start: int, x: Floats) -> tuple[Floats, str]:
     """The part of a track that goes farthest on a parabola, to its noise, and what to say of it.
 
-    It starts at some frame. What comes before and after is another motion, as that of a hand, if it
-    is off the parabola by half as much as the part goes: a drag, or a plane askew, bends it less.
+    It starts at some frame, and is at places in the plane, (n, 2). What comes before and after is
+    another motion, as that of a hand, if it is off the parabola by half as much as the part goes: a
+    drag, or a plane askew, bends it less.
     """
-    seen = np.flatnonzero(np.isfinite(pixels).all(axis=1))
-    noise, first, best = np.median(pipeline.off_neighbours(seen, pixels)), 0, (0.0, 0.0, 0, 0)
+    seen, first = np.flatnonzero(np.isfinite(x).all(axis=1)), 0
+    best: tuple[float, list[int]] = 0.0, []
     for last in range(len(seen)):
-        while last - first >= 9:
-            own = seen[first : last + 1]
-            parabola = polyfit(own - own[0], pixels[own], 2)
-            off = np.abs(polyval(seen - own[0], parabola).T - pixels[seen]).max(axis=1)
-            if off[first : last + 1].max() <= 4 * noise:
-                reach = float(np.linalg.norm(np.ptp(pixels[own], axis=0)))
-                best = max(best, (reach, float(off.max()), *own[[0, -1]].tolist()))
-                break
+        while last - first >= 9 and not _falls(own := seen[first : last + 1], x[own]):
             first += 1
-    reach, off_rest, begins, ends = best
-    if off_rest <= reach / 2:
+        if last - first >= 9:
+            reach = float(np.linalg.norm(np.ptp(x[seen[first : last + 1]], axis=0)))
+            best = max(best, (reach, [first, last]))
+    if not best[1]:
         return pixels, ""
-    begins, ends = start + begins, start + ends
+    reach, (first, last) = best
+    own = seen[first : last + 1]
+    across = np.linalg.svd(x[own] - x[own].mean(axis=0), compute_uv=False)[-1] / np.sqrt(len(own))
+    along = polyval(seen - own[0], polyfit(own - own[0], x[own], 2)).T
+    off = np.linalg.norm(along - x[seen], axis=1)
+    # On a straight line a slope may bear it.
+    if across < 4 * np.median(off[first : last + 1]) or off.max() <= reach / 2:
+        return pixels, ""
+    begins, ends = start + own[[2, -3]]  # the test hardly sees what the ends do
     told = f"it flies freely from frame {begins} to {ends}, which alone are counted"
     return _between((begins, ends), pixels, start), told
+
+
+def _falls(frames: Ints, x: Floats) -> bool:
+    """Whether three powers of the time more than a parabola explain no more of places than chance.
+
+    F-test at one in a thousand, of errors that may last.
+    """
+    n, t = len(frames), 2 * (frames - frames[0]) / np.ptp(frames) - 1
+    two, five = (x - polyval(t, polyfit(t, x, degree)).T for degree in (2, 5))
+    noise = (five**2).sum(axis=0) / (n - 6) + (CLEANEST * x.std()) ** 2
+    gain = ((two**2).sum(axis=0) - (five**2).sum(axis=0)) / 3
+    return bool((gain <= fdtri(3, n - 6, 0.999) * inflation([five]) * noise).all())
 
 
 def _let_go(pixels: Floats, start: int) -> tuple[Floats, str]:
