@@ -124,10 +124,10 @@ def discover_from_video(
         Standard error of the length or of the sides, as a share of them; .01 by default. That of
         marks, a pixel each, comes on top.
     frames : (first, last), optional
-        What counts of the film, from 0 and both included: the target may be in a hand before, or on
-        the ground after that. By default all but the rest of what is held still and then let go; or
-        the longest part without a bounce or a hit, or in free flight with the pull of the earth,
-        where that alone has a law beyond doubt.
+        What counts of the film, both included, from 0 or as a file numbers its frames: the target
+        may be in a hand before, or on the ground after. By default all but the rest of what is held
+        still and then let go; or the longest part without a bounce or a hit, or in free flight with
+        the pull of the earth, where that alone has a law beyond doubt.
     individual : str, optional
         Which of several targets of a text file; see `read_tracks`.
     hint, detector
