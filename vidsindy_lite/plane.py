@@ -19,7 +19,7 @@ from numpy.polynomial.polynomial import polyfit, polyval
 from scipy.special import fdtri
 
 from . import pipeline
-from .arrays import Floats, Ints
+from .arrays import Floats
 from .cameras import Lags, OrthographicCamera, Rig
 from .checks import check_array, check_number, check_path, check_positive, check_vector, shown
 from .dynamics.collocation import CLEANEST
@@ -238,7 +238,7 @@ def discover_from_video(
         if found.status == "ok" or warnings:  # doubts about a track are those of its parts
             break
         places = carry(to_plane, pixels)
-        part, told = _flight(pixels, first, places) if flies else _unhit(let_go, first)
+        part, told = _flight(pixels, first, t, places) if flies else _unhit(let_go, first)
         if told:
             with suppress(ValueError):  # of a part that holds too little
                 other = law_of(part, before, told)
@@ -291,17 +291,17 @@ def _unhit(pixels: Floats, start: int) -> tuple[Floats, str]:
     return _between((first, last), pixels, start), told
 
 
-def _flight(pixels: Floats, start: int, x: Floats) -> tuple[Floats, str]:
+def _flight(pixels: Floats, start: int, t: Floats, x: Floats) -> tuple[Floats, str]:
     """The part of a track that goes farthest on a parabola, to its noise, and what to say of it.
 
-    It starts at some frame, and is at places in the plane, (n, 2). What comes before and after is
-    another motion, as that of a hand, if it is off the parabola by half as much as the part goes: a
-    drag, or a plane askew, bends it less.
+    It starts at some frame, and is at places in the plane, (n, 2), at some times. What comes before
+    and after is another motion, as that of a hand, if it is off the parabola by half as much as the
+    part goes: a drag, or a plane askew, bends it less.
     """
     seen, first = np.flatnonzero(np.isfinite(x).all(axis=1)), 0
     best: tuple[float, list[int]] = 0.0, []
     for last in range(len(seen)):
-        while last - first >= 9 and not _falls(own := seen[first : last + 1], x[own]):
+        while last - first >= 9 and not _falls(t[own := seen[first : last + 1]], x[own]):
             first += 1
         if last - first >= 9:
             reach = float(np.linalg.norm(np.ptp(x[seen[first : last + 1]], axis=0)))
@@ -311,7 +311,8 @@ def _flight(pixels: Floats, start: int, x: Floats) -> tuple[Floats, str]:
     reach, (first, last) = best
     own = seen[first : last + 1]
     across = np.linalg.svd(x[own] - x[own].mean(axis=0), compute_uv=False)[-1] / np.sqrt(len(own))
-    along = polyval(seen - own[0], polyfit(own - own[0], x[own], 2)).T
+    since = t - t[own[0]]
+    along = polyval(since[seen], polyfit(since[own], x[own], 2)).T
     off = np.linalg.norm(along - x[seen], axis=1)
     # On a straight line a slope may bear it.
     if across < 4 * np.median(off[first : last + 1]) or off.max() <= reach / 2:
@@ -321,12 +322,12 @@ def _flight(pixels: Floats, start: int, x: Floats) -> tuple[Floats, str]:
     return _between((begins, ends), pixels, start), told
 
 
-def _falls(frames: Ints, x: Floats) -> bool:
+def _falls(t: Floats, x: Floats) -> bool:
     """Whether three powers of the time more than a parabola explain no more of places than chance.
 
     F-test at one in a thousand, of errors that may last.
     """
-    n, t = len(frames), 2 * (frames - frames[0]) / np.ptp(frames) - 1
+    n, t = len(t), 2 * (t - t[0]) / np.ptp(t) - 1
     two, five = (x - polyval(t, polyfit(t, x, degree)).T for degree in (2, 5))
     noise = (five**2).sum(axis=0) / (n - 6) + (CLEANEST * x.std()) ** 2
     gain = ((two**2).sum(axis=0) - (five**2).sum(axis=0)) / 3
