@@ -504,8 +504,8 @@ def without_wild(track: Floats, name: str) -> tuple[Floats, str]:
     Without such a place those beside it are on one path, as they are not where a target bounces.
     """
     kept = seen = np.flatnonzero(np.isfinite(track).all(axis=1))
-    most, wild, limit = len(seen) // 10, list[int](), _most_missed(off_neighbours(seen, track))
-    while len(seen) <= len(kept) + most and ((apart := off_neighbours(kept, track)) > limit).any():
+    most, wild, limit = len(seen) // 10, list[int](), _most_missed(_off_neighbours(seen, track))
+    while len(seen) <= len(kept) + most and ((apart := _off_neighbours(kept, track)) > limit).any():
         highest = sliding_window_view(np.pad(apart, 4), 9).max(axis=1)
         # The first three miss the same neighbours, by the same, and so do the last three.
         kept = kept[(apart <= limit) | (apart < (1 - 1e-9) * highest)]
@@ -514,8 +514,8 @@ def without_wild(track: Floats, name: str) -> tuple[Floats, str]:
     for row in seen[order[(gaps[:-1] > 1) & (gaps[1:] > 1)]].tolist() if len(order) <= most else ():
         near = np.sort(kept[np.argsort(np.abs(kept - row))[:10]])
         back = np.sort(np.append(near, row))
-        own = off_neighbours(back, track)[np.searchsorted(back, row)]
-        if own > 5 * off_neighbours(near, track).max():
+        own = _off_neighbours(back, track)[np.searchsorted(back, row)]
+        if own > 5 * _off_neighbours(near, track).max():
             wild.append(row)
     cleared = track.copy()
     cleared[wild] = np.nan
@@ -525,7 +525,7 @@ def without_wild(track: Floats, name: str) -> tuple[Floats, str]:
 def kinks(track: Floats) -> Ints:
     """Frames at which a track, (n, 2), turns as no smooth motion does: it bounces, or is hit."""
     seen = np.flatnonzero(np.isfinite(track).all(axis=1))
-    missed = off_neighbours(seen, track)
+    missed = _off_neighbours(seen, track)
     return seen[missed > _most_missed(missed)]
 
 
@@ -534,7 +534,7 @@ def _most_missed(missed: Floats) -> float:
     return max(8.0 * float(np.median(missed)), cameras.GROSS) if len(missed) >= 10 else np.inf
 
 
-def off_neighbours(rows: Ints, track: Floats) -> Floats:
+def _off_neighbours(rows: Ints, track: Floats) -> Floats:
     """By how much places of a track miss the cubic through the four beside each, over its noise."""
     if len(rows) < 5:
         return np.zeros(len(rows))

@@ -233,17 +233,16 @@ def discover_from_video(
     if frames is not None:
         return law_of(pixels)
     let_go, held = _let_go(pixels, first)
-    found = law_of(let_go, held)
-    for flies, before in ((False, held), (True, "")):
-        if found.status == "ok" or warnings:  # doubts about a track are those of its parts
+    found, x = law_of(let_go, held), carry(to_plane, pixels)
+    for flies in (False, True):
+        # Doubts about a track are those of its parts; and without metres nobody knows what falls.
+        if found.status == "ok" or warnings or (flies and not measured):
             break
-        places = carry(to_plane, pixels)
-        part, told = _flight(pixels, first, t, places) if flies else _unhit(let_go, first)
-        if told:
-            with suppress(ValueError):  # of a part that holds too little
-                other = law_of(part, before, told)
-                falls = not flies or (other.unit == "m" and other.g is not None)
-                found = other if other.status == "ok" and falls else found
+        part, told = _flight(pixels, first, t, x) if flies else _unhit(let_go, first)
+        with suppress(ValueError):  # of a part that holds too little
+            other = law_of(part, "" if flies else held, told) if told else found
+            if other.status == "ok" and (other.g is not None or not flies):
+                found = other
     return found
 
 

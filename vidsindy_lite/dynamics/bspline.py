@@ -345,7 +345,7 @@ def smooth(
     rng : numpy.random.Generator
         For the probes.
     penalties : ndarray, optional
-        Among which to choose.
+        Among which to choose, rising.
     """
     grid = Grid.of([Segment(t, x, t) for t, x in stretches])
     roughness, signs = _roughness(stretches, grid), rng.choice([-1.0, 1.0], size=len(grid.x))
