@@ -135,11 +135,15 @@ def _discover(options: argparse.Namespace) -> int:
     from .companion.report import check_folder_is_free, write_refusal, write_report
     from .dynamics import Library, check_library
     from .pipeline import Refused, Stopped
+    from .plane import TABLES
 
     if options.library is not None:
         options.library = Library.parse(options.library)
     if bool(options.videos) == bool(options.tracks):
         raise ValueError("videos: give either one video per camera, or --tracks")
+    for one in options.videos:
+        if Path(one).suffix.lower() in TABLES:
+            raise ValueError(f"videos: must be films, tracks come after --tracks, got '{one}'")
     check_folder_is_free(options.out)
     given = options.tracks or options.videos
     alone = options.rig is None and len(given) == 1

@@ -67,7 +67,7 @@ def check_items(
 
 def check_path(name: str, value: str | os.PathLike) -> Path:
     """The name of one file or folder, which can be shown."""
-    if not isinstance(value, str | os.PathLike):
+    if not isinstance(value, str | os.PathLike) or not os.fspath(value):
         raise ValueError(f"{name}: must be the name of a file, got {shown(value)}")
     path = Path(value)
     try:

@@ -243,6 +243,15 @@ def discover_from_video(
             other = law_of(part, "" if flies else held, told) if told else found
             if other.status == "ok" and (other.g is not None or not flies):
                 found = other
+            elif flies and told:
+                fall = f"length: if {told.partition(',')[0]}, "
+                also = [
+                    one.replace("length: ", fall)
+                    for one in other.warnings
+                    if one.startswith("length: g")
+                ]
+                law = replace(found.discovery, warnings=(*also, *found.warnings))
+                found = replace(found, warnings=law.warnings, discovery=law)
     return found
 
 

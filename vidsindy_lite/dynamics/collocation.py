@@ -172,7 +172,7 @@ class WithCurve(Linearisation):
     ----------
     response : ndarray, shape (r d, 1 + m + s)
         What the control points do by themselves, with each column, and each systematic error; empty
-        in `Problem.model`.
+        if it was not kept.
     shared : ndarray, shape (s, 1 + m)
         What the sizes of the systematic errors do by themselves, and with each column.
     gram : ndarray, shape (1 + m + s, 1 + m + s)
@@ -284,15 +284,17 @@ class Collocation:
         return band
 
     @cached_property
-    def _shared(self) -> tuple[Floats, Floats, Floats]:
-        """Weighted systematic errors, (n d, k), and the normal matrix of their sizes.
+    def _weighted(self) -> sparse.csr_array:
+        """All control points to all that was measured, in standard deviations, (n d, r d)."""
+        root = np.sqrt(self.sample_weights).reshape(-1, 1)
+        return sparse.csr_array(self.grid.measured.multiply(root))
 
-        And how they pull at the control points, (r d, k).
-        """
+    @cached_property
+    def _shared(self) -> tuple[Floats, Floats]:
+        """Weighted systematic errors, (n d, k), and the normal matrix of their sizes."""
         flat = self.systematic.reshape(self.grid.x.size, -1)
         weighted = self.sample_weights.reshape(-1, 1) * flat
-        information = weighted.T @ flat + np.eye(flat.shape[1])
-        return weighted, information, self.grid.measured.T @ weighted
+        return weighted, weighted.T @ flat + np.eye(flat.shape[1])
 
     def curve(self, control_points: Floats) -> Floats:
         """The curve at the samples, shape (n, d)."""
@@ -309,7 +311,7 @@ class Collocation:
         """
         curve = self.curve(control_points)
         residual = np.where(self.precision > 0, curve - self.grid.x, 0.0)
-        weighted, information, _ = self._shared
+        weighted, information = self._shared
         sizes = -np.linalg.solve(information, np.einsum("sk,s->k", weighted, residual.ravel()))
         return residual + (self.precision > 0) * (self.systematic @ sizes), sizes
 
@@ -336,7 +338,12 @@ class Collocation:
         return self.data_loss(state.control_points) + float(squares @ self.physics_weights)
 
     def linearise(
-        self, state: State, columns: Ints, damping: float = 0.0, part: Bools | None = None
+        self,
+        state: State,
+        columns: Ints,
+        damping: float = 0.0,
+        part: Bools | None = None,
+        curve: bool = True,
     ) -> WithCurve:
         """Linearise around a state and eliminate the control points.
 
@@ -351,6 +358,8 @@ class Collocation:
         part : ndarray of bool, shape (k,), optional
             Nodes at which all columns once more are unknowns of their own: these come after the
             others, their numbers larger by the size of `State.flat`.
+        curve : bool
+            Keep what the curve does: it is as large as the data in each column.
 
         Raises
         ------
@@ -363,26 +372,33 @@ class Collocation:
             unknowns = np.insert(unknowns, [1 + len(columns)], own, axis=1)
             columns = np.append(columns, columns + len(state.sources))
         data_residual, sizes = self.data_residual(state.control_points)
-        factor = self._factor(physics, damping)
-
-        response = physics.T @ unknowns
-        response[:, 0] += self.grid.measured.T @ (data_residual * self.sample_weights).ravel()
-        response[:, 1 + len(columns) :] = self._shared[-1]
         objective = (data_residual**2 * self.sample_weights).sum() + sizes @ sizes
         objective += (unknowns[:, 0] ** 2).sum()
+        factor, data = self._factor(physics, damping), self._weighted
+        misses = np.zeros((*data_residual.shape, unknowns.shape[1]))
+        misses[..., 0], misses[..., 1 + len(columns) :] = data_residual, self.systematic
+        misses = (np.sqrt(self.sample_weights)[..., None] * misses).reshape(-1, unknowns.shape[1])
         # A few columns at once: of long data, each copy of all of them is large.
-        for first in range(0, response.shape[1], 16):
-            some = slice(first, first + 16)
-            response[:, some] = -cho_solve_banded((factor, True), response[:, some], False, False)
-            unknowns[:, some] += physics @ response[:, some]
-        whole = self._gram(unknowns, response, data_residual)
+        response, once = [], min(16, 1 + 3_000_000 // len(unknowns))
+        for first in range(0, unknowns.shape[1], once):
+            some = slice(first, first + once)
+            pull = physics.T @ unknowns[:, some]
+            if misses[:, some].any():
+                pull += data.T @ misses[:, some]
+            moves = -cho_solve_banded((factor, True), pull, True, False)
+            unknowns[:, some] += physics @ moves
+            misses[:, some] += data @ moves
+            response += [moves] if curve else []
+        # The Gram matrix of what the curve cannot follow is the Schur complement, without the
+        # cancellation between two large matrices that a large physics weight would bring.
+        whole = unknowns.T @ unknowns + misses.T @ misses
         gram, shared = _without_systematic(whole, sizes)
         return WithCurve(
             fall=float(objective - gram[0, 0]),
             columns=columns,
             information=gram[1:, 1:],
             gradient=-gram[1:, 0],
-            response=response,
+            response=np.hstack(response) if curve else np.empty((0, 0)),
             shared=shared,
             gram=whole,
             sizes=sizes,

@@ -138,12 +138,8 @@ class Problem:
         return np.concatenate([self.form.searched, size + np.flatnonzero(state.moving)])
 
     def model(self, fit: Fit) -> WithCurve:
-        """The quadratic model around a fit, in all candidates and moving axes.
-
-        Without the response of the curve, which is as large as the data in all of these columns.
-        """
-        whole = fit.collocation.linearise(fit.state, self.columns(fit.state))
-        return replace(whole, response=np.empty((0, 0)))
+        """The quadratic model around a fit, in all candidates and moving axes."""
+        return fit.collocation.linearise(fit.state, self.columns(fit.state), curve=False)
 
     @property
     def origin(self) -> Floats:

@@ -437,7 +437,7 @@ def _track(
             "corner, y down, which holds only if the axes were set so: export its columns pixelx "
             "and pixely",
         )
-    if np.nanmax(pixels, initial=0) <= 1 and len(pixels) > 2:
+    if 0 < np.nanmax(pixels, initial=0) <= 1 and len(pixels) > 2:
         doubts += (f"{name}: no pixel of it is beyond 1: are these fractions of the image?",)
     pixels[~_seen(columns)] = np.nan
     # What many programs write where nothing was found.
