@@ -281,7 +281,7 @@ def test_a_camera_that_looks_askew_by_little_is_no_reason_to_doubt(monkeypatch):
         found = vl.discover_from_video("throw.mp4", (u, v + 125, u, v - 125, 1.0))
         assert found.status == status
         assert abs(found.g.value - 9.81) < 3 * found.g.error < 1
-    assert found.warnings[-1].startswith("frames: all were taken to be of one motion")
+    assert found.warnings[0].startswith("frames: all were taken to be of one motion")
 
 
 def test_what_bounces_and_what_flies_from_hand_to_hand_counts_in_between(monkeypatch):
@@ -300,6 +300,8 @@ def test_what_bounces_and_what_flies_from_hand_to_hand_counts_in_between(monkeyp
         assert (found.status, abs(found.g.value - 9.81) < 2 * found.g.error) == ("ok", True)
     # Without a length, nothing tells what falls from what a hand turns round.
     assert vl.discover_from_video("ball.mp4").status == "suspect"
+    told = vl.discover_from_video("ball.mp4", (*STICK[:4], 0.7)).warnings[0]
+    assert re.match(r"length: if it flies freely .*: the marks may be (0.7|1.4)", told)
 
 
 def test_a_wrong_length_and_a_wrong_vertical_are_told(monkeypatch):

@@ -913,8 +913,8 @@ def with_law(seen: Observation, names: Sequence[str], law: dict[str, Any]) -> Vi
         See `law_options`.
     """
     default = all(law[name] in (None, "auto") for name in ("degree", "library", "order"))
-    if default and isinstance(seen.rig.cameras[0], cameras.AffineCamera):
-        law |= {"degree": 1, "order": 2}
+    affine = isinstance(seen.rig.cameras[0], cameras.AffineCamera)
+    law = law | ({"degree": 1, "order": 2} if default and affine else {})
     reach = np.nanmax(seen.x, axis=0) - np.nanmin(seen.x, axis=0)
     moves = reach > 1e-9 * reach.max()  # but for rounding; others are at rest
     with refusing("law", seen.tracks, names):
@@ -925,12 +925,14 @@ def with_law(seen: Observation, names: Sequence[str], law: dict[str, Any]) -> Vi
         share = (left @ left) / max(len(left), 1) / np.nanvar(pixels, axis=0).mean()
         apart = float(np.sqrt(share))
         x, modes, circle = seen.x[:, moves], seen.systematic[..., moves], None
-        if default and seen.targets == 1:
+        if default and seen.targets == 1 and not affine:  # there no circle is one, and no pull g
             found, circle = simplest(seen.t, x, modes, law, apart)
         elif seen.targets == 1 and law["library"] is None:
             found = _where_it_moves(seen.t, x, modes, law, apart)
         else:
             found = dynamics.discover(seen.t, x, systematic=modes, **law)
+    if affine:
+        found = replace(found, force="pull", swing=None)
     axes = np.eye(len(moves))[moves]
     if circle is not None:
         spread = axes.T @ circle.centre_covariance @ axes

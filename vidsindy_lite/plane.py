@@ -219,15 +219,18 @@ def discover_from_video(
             law = replace(found.discovery, force="pull")
             with_line = pipeline.noted(found.rig, f"{line}, its pull is no g")
             found = replace(found, rig=with_line, discovery=law)
-        contradicted = _contradicted(found, up is not None or corners is not None, corners is None)
-        if found.warnings != seen.warnings and frames is None:
+        doubted, contradicted = found.warnings != seen.warnings, list[str]()
+        if not doubted or found.circle is not None:  # else its g is none
+            vertical = up is not None or corners is not None
+            contradicted += _contradicted(found, vertical, corners is None)
+        if doubted and frames is None:
             contradicted.append(
                 f"frames: all{' of these' if any(cuts) else ''} were taken to be of one motion: if "
                 "it begins in a hand or ends on the ground, give the first and the last frame that "
                 "count; and before a plain wall, which does not show how a hand trembles, the "
                 "phone has to stand on something"
             )
-        law = replace(found.discovery, warnings=(*found.warnings, *contradicted))
+        law = replace(found.discovery, warnings=(*contradicted, *found.warnings))
         return replace(found, warnings=law.warnings, discovery=law)
 
     if frames is not None:
@@ -283,8 +286,8 @@ def _unhit(pixels: Floats, start: int) -> tuple[Floats, str]:
 
     It starts at some frame. Parts are long enough for a law if they hold ten frames.
     """
-    turns = pipeline.kinks(pixels)
-    ends = np.concatenate([[-1], turns, [len(pixels)]])
+    turns, seen = pipeline.kinks(pixels), np.flatnonzero(np.isfinite(pixels).all(axis=1))
+    ends = np.concatenate([[seen[0] - 1], turns, [seen[-1] + 1]])
     longest = int(np.diff(ends).argmax())
     first, last = int(ends[longest]) + 1, int(ends[longest + 1]) - 1
     if not len(turns) or last - first < 10:
@@ -293,8 +296,8 @@ def _unhit(pixels: Floats, start: int) -> tuple[Floats, str]:
     places = np.split(turns, np.flatnonzero(np.diff(turns) > 2) + 1)
     each = ", ".join(str(start + int(np.median(one))) for one in places[:5])
     told = (
-        f"it turns sharply at frames {each}, as where it bounces, is hit, or frames are missing: "
-        f"counted from {first} to {last}"
+        f"it turns sharply at frame{'s' * (len(places) > 1)} {each}, as where it bounces, is hit, "
+        f"or frames are missing: counted from {first} to {last}"
     )
     return _between((first, last), pixels, start), told
 
@@ -304,7 +307,7 @@ def _flight(pixels: Floats, start: int, t: Floats, x: Floats) -> tuple[Floats, s
 
     It starts at some frame, and is at places in the plane, (n, 2), at some times. What comes before
     and after is another motion, as that of a hand, if it is off the parabola by half as much as the
-    part goes: a drag, or a plane askew, bends it less.
+    part goes: a drag, or a plane askew, bends it less. What a slope bears falls aside.
     """
     seen, first = np.flatnonzero(np.isfinite(x).all(axis=1)), 0
     best: tuple[float, list[int]] = 0.0, []
@@ -318,12 +321,10 @@ def _flight(pixels: Floats, start: int, t: Floats, x: Floats) -> tuple[Floats, s
         return pixels, ""
     reach, (first, last) = best
     own = seen[first : last + 1]
-    across = np.linalg.svd(x[own] - x[own].mean(axis=0), compute_uv=False)[-1] / np.sqrt(len(own))
     since = t - t[own[0]]
-    along = polyval(since[seen], polyfit(since[own], x[own], 2)).T
-    off = np.linalg.norm(along - x[seen], axis=1)
-    # On a straight line a slope may bear it.
-    if across < 4 * np.median(off[first : last + 1]) or off.max() <= reach / 2:
+    parabola = polyfit(since[own], x[own], 2)
+    off = np.linalg.norm(polyval(since[seen], parabola).T - x[seen], axis=1)
+    if off.max() <= reach / 2 or not np.abs(parabola[2, 0]) < np.tan(HELD) * -parabola[2, 1]:
         return pixels, ""
     begins, ends = start + own[[2, -3]]  # the test hardly sees what the ends do
     told = f"it flies freely from frame {begins} to {ends}, which alone are counted"
@@ -460,7 +461,8 @@ def _contradicted(found: PlaneDiscovery, vertical: bool, askew: bool) -> list[st
         )
     if found.unit == "m" and g is not None:
         times = float(g.value) / EARTH
-        if abs(times - 1) * EARTH > SURE * np.hypot(float(g.error), ELSEWHERE):
+        error = float(g.error) / max(times, 1.0)  # what is too long errs by as much more
+        if abs(times - 1) * EARTH > SURE * np.hypot(error, ELSEWHERE):
             wrong = (
                 f"the marks may be {1 / times:.3g} times as far apart as is given, or the frames "
                 f"a second {1 / np.sqrt(times):.3g} times as many, or the plane may lie askew"

@@ -22,7 +22,7 @@ from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 from string import ascii_lowercase
-from typing import TypeAlias, cast
+from typing import Any, TypeAlias, cast
 
 import cv2
 import jinja2
@@ -335,7 +335,9 @@ def _figures(found: VideoDiscovery, paths: Videos) -> Iterator[tuple[str, bytes]
     d = 3 if np.nan_to_num(x)[:, 2].any() else 2  # in the plane of one camera
     curves = {"reconstructed": x[:, :d]}
     curves["curve that obeys the law"] = stacked(found.fitted, 3)[:, :d]
-    units = {"unit": "s", "length": found.unit} if isinstance(found, PlaneDiscovery) else {}
+    units: dict[str, Any] = {}
+    if isinstance(found, PlaneDiscovery):
+        units = {"unit": "s", "length": found.unit, "numbered": paths is not None}
     yield "path", _picture(plot_path, t, curves, "not seen", **units)
     seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
     if seen.any() and paths is not None:
@@ -462,7 +464,8 @@ def write_pick_page(paths: Sequence[str | os.PathLike], out: str | os.PathLike) 
     FileNotFoundError, ValueError
         If a video is missing or none, or another file is at `out`.
     """
-    return write_page("out", out, "pick.html", videos=(_video(Path(path)) for path in paths))
+    videos = (_video(Path(path)) for path in paths)
+    return write_page("out", out, "pick.html", alone=len(paths) == 1, videos=videos)
 
 
 def _video(path: Path) -> dict[str, object]:

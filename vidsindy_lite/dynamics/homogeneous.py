@@ -259,6 +259,7 @@ def _misfit(x: Floats, flight: Flight, noise: float, most: float = 5.0) -> tuple
     )
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of drags far beyond those that the data allow
 def _outlying_ends(t: Floats, x: Floats, modes: Floats) -> tuple[str, ...]:
     """Places that are no part of the flight, with drag, which all but the two ends tell.
 

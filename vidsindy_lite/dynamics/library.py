@@ -352,14 +352,16 @@ def _curve(name: str, t: Floats, values: Floats, hold: str | None) -> tuple[BSpl
     curves = {kind: make_interp_spline(t, values, degree) for kind, degree in degrees.items()}
     if hold is None:
         middles, steps = (t[1:] + t[:-1]) / 2, np.abs(np.diff(values))
+        lacks = np.diff(t) > 1.5 * np.median(np.diff(t))  # samples, which is no jump
         # Midway a cubic is so far from a line at six samples of a sine a period: more is a guess.
         much = 0.1 * values.std() + 1e-9 * np.abs(values).max()  # more than rounding
         bend = np.abs(curves["cubic"](middles) - curves["linear"](middles))
-        hold = "zero" if (bend > much).any() else "cubic"
-        if hold == "zero":
-            unsure = np.column_stack([t[:-1], t[1:]])[steps > much]
+        sharp = (bend > much) & ~lacks
+        hold = "zero" if sharp.any() else "cubic"
+        unsure = np.column_stack([t[:-1], t[1:]])[(steps if sharp.any() else lacks * bend) > much]
+        if sharp.any():
             warnings.warn(
-                f"inputs: {name} jumps, as at t = {t[1 + steps.argmax()]:g}, "
+                f"inputs: {name} jumps, as at t = {t[1 + (steps * ~lacks).argmax()]:g}, "
                 "where a cubic through its samples is a guess: the value of each holds until the "
                 "next, but nobody knows when it jumped since the one before, so that nothing is "
                 "made of what happens between the two. If it jumps at these times say "

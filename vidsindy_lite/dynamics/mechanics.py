@@ -707,7 +707,7 @@ def _height_error(flat: Floats, height: Floats, place: Floats) -> float:
 def _axes(away: Floats, zero: ArrayLike | None, span: Floats) -> Floats:
     """Orthonormal directions in a span (k, d): the first towards zero, then by how wide the motion.
 
-    The sign of each but the first is such that its largest component is positive.
+    The largest component of each but the first, or of the normal of a circle, is positive.
     """
     first = away.mean(axis=0) if zero is None else check_vector("zero", zero, away.shape[1])
     within = span.T @ (span @ first)
@@ -719,5 +719,7 @@ def _axes(away: Floats, zero: ArrayLike | None, span: Floats) -> Floats:
     rest = rest - np.outer(rest @ first, first)
     _, directions = np.linalg.eigh(rest.T @ rest)
     others = directions.T[::-1][: len(span) - 1]
-    signs = np.sign(others[np.arange(len(others)), np.abs(others).argmax(axis=1)])
+    wide = ((0, 0), (0, 3 - len(first)))
+    told = others if len(span) > 2 else np.cross(*np.pad([[first], others], ((0, 0), *wide)))
+    signs = np.sign(told[np.arange(len(told)), np.abs(told).argmax(axis=1)])
     return np.vstack([first, others * signs[:, None]])

@@ -14,6 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from mpl_toolkits.mplot3d import Axes3D
+from scipy.interpolate import make_interp_spline
 
 from ...arrays import Floats, Image
 from ...cameras import Camera, PerspectiveCamera, Rig
@@ -286,6 +287,7 @@ def plot_path(
     styles: Sequence[Mapping[str, Any]] = LINES,
     unit: str = "units of the equations",
     length: str = "scene units",
+    numbered: bool = False,
 ) -> Figure:
     """Draw curves over time, coordinate by coordinate, and in space.
 
@@ -300,6 +302,8 @@ def plot_path(
         Of the lines, in this order.
     unit, length : str
         Units of the times and of the positions.
+    numbered : bool
+        Whether the numbers of the times are on an axis of their own, as those of frames.
     """
     figure = plt.figure(figsize=(10.5, 4.7))
     names = "xyz"[: next(iter(curves.values())).shape[1]]
@@ -319,6 +323,10 @@ def plot_path(
         axes.set_ylabel(name)
         axes.label_outer()
     panels[names[-1]].set_xlabel(f"time ({unit}); {', '.join(names)} in {length}")
+    if numbered:
+        frames = np.arange(len(t))
+        both = make_interp_spline(t, frames, 1), make_interp_spline(frames, t, 1)
+        panels[names[0]].secondary_xaxis("top", functions=both).set_xlabel("frame")
     for (label, curve), style in zip(curves.items(), styles, strict=True):
         space.plot(*curve.T, label=label, **style)
     if missing:
