@@ -1,10 +1,7 @@
-"""Exercises, made of their solutions, which lie apart: notebooks/solutions/ is the source.
+"""Exercises, made of notebooks/solutions/ by `python tests/exercises.py`, `--force` of all.
 
 A cell with the tag `solution` is not in the exercise: text is left out, code becomes a blank cell,
 which says what names the check behind it looks at. The check says whether what they are is right.
-
-    python tests/exercises.py             what has changed
-    python tests/exercises.py --force     all solutions executed again
 """
 
 import ast

@@ -1,13 +1,8 @@
-"""Every notebook holds for other settings, and none hangs on the last digits.
+"""Every notebook holds for two other settings each, and none hangs on the last digits.
 
-Assertions of a notebook have to test what it says, not the numbers of its default: each has two
-other settings. One of a small one runs with all tests, the rest by `pytest -m thorough`.
-
-Each run of all tests disturbs tracks and trajectories of the quick notebooks, see `test_notebooks`.
-So is the full profile, in a copy of the repository whose figures are then compared:
-
-    VIDSINDY_DISTURB=1e-9:1 PYTHONPATH=tests/disturbed make figures FORCE=1
-    python -m vidsindy_lite compare figures ../copy/figures
+One setting of a small one runs with all tests, the rest by `pytest -m thorough`. Tracks and
+trajectories of quick notebooks are disturbed in `test_notebooks`, of all in a copy, to `compare`:
+VIDSINDY_DISTURB=1e-9:1 PYTHONPATH=tests/disturbed make figures FORCE=1
 """
 
 import pytest

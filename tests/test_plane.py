@@ -259,7 +259,7 @@ def test_what_is_held_before_it_moves_does_not_count(monkeypatch, kind):
 
 def test_a_wheel_turns_by_the_law_of_its_angle(monkeypatch):
     t = np.arange(120) / 30
-    angles = {"1": 6 * t - 0.6 * t**2, "vangle": -20 * np.exp(-0.3 * t), "": 6 * t}
+    angles = {"1": 6 * t - 0.6 * t**2, "vangle": -20 * np.exp(-0.3 * t), "": -6 * t}
     for term, angle in angles.items():
         turned = 0.4 * np.column_stack([np.cos(angle), np.sin(angle)])
         filmed(monkeypatch, pixels_of(noisy(turned, 0)))
@@ -267,6 +267,7 @@ def test_a_wheel_turns_by_the_law_of_its_angle(monkeypatch):
         law = found.discovery
         told = [law.terms[row] for row in np.flatnonzero(law.system.support[:, 1])]
         assert (found.status, found.g, "".join(told)) == ("ok", None, term)
+        assert np.sign(law.curve(found.t)[0, 1]) == np.sign(angle[1] - angle[0])
     turned = 0.4 * np.column_stack([np.cos(60 * t), np.sin(60 * t)])  # a third of a turn a frame
     filmed(monkeypatch, pixels_of(noisy(turned, 0)))
     doubts = vl.discover_from_video("wheel.mp4", STICK).warnings

@@ -163,6 +163,17 @@ def jumping(studio):
     return "\n".join(vl.discover(t, x, degree=1, order=1).warnings)
 
 
+def thrown(studio):
+    """From a hand, at a length that is wrong by a third."""
+    t = np.arange(-12, 22)[:, None] / 30
+    x = np.where(t < 0, ((1 + t / 0.4) ** 3 - 1) * 0.4 / 3, t) * [1.5, 5]
+    x -= np.maximum(t, 0) ** 2 * [0, 9.81 / 2]
+    table = studio.folder / "throw.csv"
+    rows = x * [200, -200] + np.random.default_rng(0).normal([100, 400], 0.2, x.shape)
+    np.savetxt(table, rows, "%.3f", ",", header="u,v", comments="")
+    return told(vl.discover_from_video, table, (0, 300, 0, 100, 1.3), fps=30)
+
+
 def occupied(studio):
     (studio.folder / "occupied").mkdir(exist_ok=True)
     (studio.folder / "occupied" / "rig.toml").write_text("")
@@ -232,6 +243,8 @@ TROUBLES = {
     "from a drive or a force that nobody named": kicked,
     "must hold no files of the names": occupied,
     "explains it": swapped,
+    "is not the 9.81 of what flies or swings freely": thrown,
+    "were taken to be of one motion": thrown,
 }
 
 

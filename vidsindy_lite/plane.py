@@ -19,7 +19,7 @@ from numpy.polynomial.polynomial import polyfit, polyval
 from scipy.special import fdtri
 
 from . import pipeline
-from .arrays import Floats
+from .arrays import Floats, Ints
 from .cameras import Lags, OrthographicCamera, Rig
 from .checks import check_array, check_number, check_path, check_positive, check_vector, shown
 from .dynamics.collocation import CLEANEST
@@ -282,17 +282,21 @@ def _between(frames: Sequence[int], pixels: Floats, start: int) -> Floats:
 
 
 def _unhit(pixels: Floats, start: int) -> tuple[Floats, str]:
-    """The longest part of a track in which nothing hits the target, and what to say of it.
+    """The part of a track that goes farthest without a hit, and what to say of it.
 
-    It starts at some frame. Parts are long enough for a law if they hold ten frames.
+    It starts at some frame. Parts are long enough for a law if they hold more than ten frames.
     """
     turns, seen = pipeline.kinks(pixels), np.flatnonzero(np.isfinite(pixels).all(axis=1))
-    ends = np.concatenate([[seen[0] - 1], turns, [seen[-1] + 1]])
-    longest = int(np.diff(ends).argmax())
-    first, last = int(ends[longest]) + 1, int(ends[longest + 1]) - 1
-    if not len(turns) or last - first < 10:
+
+    def reach(rows: Ints) -> float:
+        return float(np.linalg.norm(np.ptp(pixels[rows], axis=0)))
+
+    free = np.setdiff1d(seen, turns)
+    parts = [part for part in np.split(free, np.searchsorted(free, turns)) if len(part) > 10]
+    far = max(parts, key=reach, default=seen[:1])
+    if not len(turns) or reach(far) < reach(seen) / 10:  # at rest
         return pixels, ""
-    first, last = start + first, start + last
+    first, last = (start + far[[0, -1]]).tolist()
     places = np.split(turns, np.flatnonzero(np.diff(turns) > 2) + 1)
     each = ", ".join(str(start + int(np.median(one))) for one in places[:5])
     told = (
@@ -310,21 +314,23 @@ def _flight(pixels: Floats, start: int, t: Floats, x: Floats) -> tuple[Floats, s
     part goes: a drag, or a plane askew, bends it less. What a slope bears falls aside.
     """
     seen, first = np.flatnonzero(np.isfinite(x).all(axis=1)), 0
-    best: tuple[float, list[int]] = 0.0, []
+    best = 0.0, 0, 0
     for last in range(len(seen)):
         while last - first >= 9 and not _falls(t[own := seen[first : last + 1]], x[own]):
             first += 1
         if last - first >= 9:
             reach = float(np.linalg.norm(np.ptp(x[seen[first : last + 1]], axis=0)))
-            best = max(best, (reach, [first, last]))
-    if not best[1]:
+            best = max(best, (reach, first, last))
+    reach, first, last = best
+    if not reach:
         return pixels, ""
-    reach, (first, last) = best
     own = seen[first : last + 1]
     since = t - t[own[0]]
     parabola = polyfit(since[own], x[own], 2)
     off = np.linalg.norm(polyval(since[seen], parabola).T - x[seen], axis=1)
-    if off.max() <= reach / 2 or not np.abs(parabola[2, 0]) < np.tan(HELD) * -parabola[2, 1]:
+    whole = np.linalg.norm(np.ptp(x[seen], axis=0))  # any smooth motion falls so for a while
+    upright = np.abs(parabola[2, 0]) < np.tan(HELD) * -parabola[2, 1]
+    if off.max() <= reach / 2 or reach <= whole / 2 or not upright:
         return pixels, ""
     begins, ends = start + own[[2, -3]]  # the test hardly sees what the ends do
     told = f"it flies freely from frame {begins} to {ends}, which alone are counted"

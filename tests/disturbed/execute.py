@@ -1,8 +1,7 @@
 """Execute a notebook as plain Python, in its quick profile or with other settings, on no paper.
 
 Its figures are laid out and drawn, see `undisplayed.py`, its tables go to VIDSINDY_FIGURES, as from
-a run through papermill, in a part of its time. Sweeps work in this very process: the cores are
-busy.
+a run through papermill, in a part of its time. Sweeps work in this very process.
 """
 
 import importlib

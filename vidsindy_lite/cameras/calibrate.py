@@ -329,8 +329,8 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     if not found.settled:
         doubts += (
             f"the search for the cameras did not converge in {found.steps} evaluations: their "
-            "scales and angles may be off; check the positions and normals, or give more of what "
-            "is known",
+            "scales and angles may be off; check what was measured, or give more of what is known "
+            "(a motion on a line or in a plane tells little of cameras)",
         )
     off = np.abs(found.change) / np.where(errors > 0, errors, np.inf)
     # So many of the measurements the tracks tell: of each the share by which it is known better.

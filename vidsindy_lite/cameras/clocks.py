@@ -117,7 +117,8 @@ def untold_lags(choices: Sequence[Floats]) -> str:
     lags = " or ".join(f"({list_lags(lags)})" for lags in choices[:3])
     return (
         f"the lags of the videos cannot be told: {lags} frames fit about equally well, because "
-        "the motion repeats itself; give the lags if you know them"
+        "the motion repeats itself, or is in a plane before cameras that nobody measured; give the "
+        "lags if you know them"
     )
 
 
