@@ -98,7 +98,7 @@ def dense_jacobian(problem, state, columns):
 def test_schur_complement_and_gradient_agree_with_dense_algebra(problem, state):
     assert problem.objective(state) == pytest.approx((residuals(problem, state) ** 2).sum())
     columns = np.arange(14)  # all terms, active or not, and both axes of the offset
-    model = problem.linearise(state, columns)
+    model = problem.linearise(state, columns, 0.0)
     jacobian = dense_jacobian(problem, state, columns)
     curve, law = np.split(jacobian, [state.control_points.size], axis=1)
     projector = np.eye(len(curve)) - curve @ np.linalg.pinv(curve)

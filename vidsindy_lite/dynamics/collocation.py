@@ -172,7 +172,7 @@ class WithCurve(Linearisation):
     ----------
     response : ndarray, shape (r d, 1 + m + s)
         What the control points do by themselves, with each column, and each systematic error; empty
-        if it was not kept.
+        where no step is to be taken.
     shared : ndarray, shape (s, 1 + m)
         What the sizes of the systematic errors do by themselves, and with each column.
     gram : ndarray, shape (1 + m + s, 1 + m + s)
@@ -338,12 +338,7 @@ class Collocation:
         return self.data_loss(state.control_points) + float(squares @ self.physics_weights)
 
     def linearise(
-        self,
-        state: State,
-        columns: Ints,
-        damping: float = 0.0,
-        part: Bools | None = None,
-        curve: bool = True,
+        self, state: State, columns: Ints, damping: float | None = None, part: Bools | None = None
     ) -> WithCurve:
         """Linearise around a state and eliminate the control points.
 
@@ -353,13 +348,12 @@ class Collocation:
             Where.
         columns : ndarray of int
             Entries of `State.flat` to keep as unknowns, active or not.
-        damping : float
-            Relative Levenberg-Marquardt damping of the control points.
+        damping : float, optional
+            Relative Levenberg-Marquardt damping of the control points, if a step is to be taken:
+            then what the curve does is kept, which is as large as the data in each column.
         part : ndarray of bool, shape (k,), optional
             Nodes at which all columns once more are unknowns of their own: these come after the
             others, their numbers larger by the size of `State.flat`.
-        curve : bool
-            Keep what the curve does: it is as large as the data in each column.
 
         Raises
         ------
@@ -374,7 +368,7 @@ class Collocation:
         data_residual, sizes = self.data_residual(state.control_points)
         objective = (data_residual**2 * self.sample_weights).sum() + sizes @ sizes
         objective += (unknowns[:, 0] ** 2).sum()
-        factor, data = self._factor(physics, damping), self._weighted
+        factor, data = self._factor(physics, damping or 0.0), self._weighted
         misses = np.zeros((*data_residual.shape, unknowns.shape[1]))
         misses[..., 0], misses[..., 1 + len(columns) :] = data_residual, self.systematic
         misses = (np.sqrt(self.sample_weights)[..., None] * misses).reshape(-1, unknowns.shape[1])
@@ -388,7 +382,7 @@ class Collocation:
             moves = -cho_solve_banded((factor, True), pull, True, False)
             unknowns[:, some] += physics @ moves
             misses[:, some] += data @ moves
-            response += [moves] if curve else []
+            response += [moves] * (damping is not None)
         # The Gram matrix of what the curve cannot follow is the Schur complement, without the
         # cancellation between two large matrices that a large physics weight would bring.
         whole = unknowns.T @ unknowns + misses.T @ misses
@@ -398,7 +392,7 @@ class Collocation:
             columns=columns,
             information=gram[1:, 1:],
             gradient=-gram[1:, 0],
-            response=np.hstack(response) if curve else np.empty((0, 0)),
+            response=np.hstack(response or [np.empty((0, 0))]),
             shared=shared,
             gram=whole,
             sizes=sizes,

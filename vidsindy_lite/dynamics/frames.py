@@ -96,8 +96,7 @@ def laws_at(
     """
     state, columns = whole.state, np.flatnonzero(whole.state.free())
     information = np.diag(np.where(state.free()[: -problem.d], 0.0, 1e30))
-    model = whole.collocation.linearise(state, columns, curve=False)
-    gradient = np.zeros(len(information))
+    model, gradient = whole.collocation.linearise(state, columns), np.zeros(len(information))
     information[np.ix_(columns, columns)], gradient[columns] = model.information, model.gradient
     objective, size = whole.collocation.objective(state), len(columns)
     generators = shift_generators(problem.exponents)

@@ -152,7 +152,7 @@ def select(problem: Problem, start: Fit, weight: float, stage: str, history: His
     for _ in range(LONGEST_SEARCH):
         state = best.state
         columns = problem.columns(state)
-        model = weighted.linearise(state, columns)
+        model = weighted.linearise(state, columns, 0.0)
         support, solution, _ = subset_search(
             model.information, model.gradient, state.flat()[columns], problem.costs(columns),
             state.free()[columns],

@@ -139,7 +139,7 @@ class Problem:
 
     def model(self, fit: Fit) -> WithCurve:
         """The quadratic model around a fit, in all candidates and moving axes."""
-        return fit.collocation.linearise(fit.state, self.columns(fit.state), curve=False)
+        return fit.collocation.linearise(fit.state, self.columns(fit.state))
 
     @property
     def origin(self) -> Floats:
