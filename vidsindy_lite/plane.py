@@ -247,12 +247,9 @@ def discover_from_video(
             if other.status == "ok" and (other.g is not None or not flies):
                 found = other
             elif flies and told:
-                fall = f"length: if {told.partition(',')[0]}, "
-                also = [
-                    one.replace("length: ", fall)
-                    for one in other.warnings
-                    if one.startswith("length: g")
-                ]
+                fall = f": if {told.partition(',')[0]}, "
+                doubt = (one for one in other.warnings if "flies or swings freely" in one)
+                also = [one.replace(": ", fall, 1) for one in doubt]
                 law = replace(found.discovery, warnings=(*also, *found.warnings))
                 found = replace(found, warnings=law.warnings, discovery=law)
     return found
@@ -475,7 +472,8 @@ def _contradicted(found: PlaneDiscovery, vertical: bool, askew: bool) -> list[st
                 if times > 0
                 else "it does not hang there, or the plane lies askew"
             )
-            doubts.append(f"length: {g} is not the {EARTH} of what flies or swings freely: {wrong}")
+            what = "length" if askew else "corners"
+            doubts.append(f"{what}: {g} is not the {EARTH} of what flies or swings freely: {wrong}")
     if found.circle is None and g is not None:
         pull = found.discovery.physics()["direction"]
         (aside, upwards, _), off = pull.value @ found.turn, pull.error @ np.abs(found.turn)

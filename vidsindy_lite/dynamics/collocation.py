@@ -436,19 +436,6 @@ class Collocation:
         unknowns[:, :, 1 + count : 1 + size] = jacobian[:, :, offset_columns]
         return self.grid.physics(root * below, jacobian), unknowns.reshape(-1, unknowns.shape[-1])
 
-    def _gram(self, left: Floats, solved: Floats, data_residual: Floats) -> Floats:
-        """Gram matrix of what the curve cannot follow, in physics (``left``) and data.
-
-        It is the Schur complement, without the cancellation between two large matrices that a
-        large physics weight would bring.
-        """
-        follow = self.grid.measured @ solved
-        follow[:, 0] += data_residual.ravel()
-        shared = self.systematic.reshape(len(follow), -1)
-        follow[:, follow.shape[1] - shared.shape[1] :] += shared
-        follow *= np.sqrt(self.sample_weights).reshape(-1, 1)
-        return np.asarray(left.T @ left + follow.T @ follow)
-
     @np.errstate(over="ignore", invalid="ignore")  # of steps that go too far, and are refused
     def solve(self, state: State, tolerance: float = 1e-2, max_steps: int = 30) -> Fit:
         """Minimise the objective over the curve and the free coefficients and offsets.
