@@ -222,8 +222,8 @@ def one_a_frame(places, qualities):
     n = len(places)
     box = np.column_stack([places - 4, np.full((n, 2), 9.0)])
     colour = np.tile([30.0, 30, 200], (n, 1))
-    return Candidates(np.arange(n), places, places, box, np.full(n, 60.0), colour,
-                      np.full((n, 3), 100.0), np.asarray(qualities, float))  # fmt: skip
+    return Candidates(np.arange(n), places, places, box, np.full(n, 60.0), colour, 0 * colour + 100,
+                      np.asarray(qualities, float), np.ones(n, bool))  # fmt: skip
 
 
 SIZE = 1e-9  # of what disturbs tracks and trajectories, relatively

@@ -554,10 +554,10 @@ def check_found(
         If one does not.
     """
     wanted = "one moving target" if targets == 1 else f"{targets} moving targets"
-    still = "what moves by less than a tenth of its own width is taken for background"
+    still = ("what moves by less than a tenth of its own width is taken for background; a box "
+             "around the one target in one frame shows it: --hint, pick, vl.Hint")  # fmt: skip
     for pixels, name, causes in zip(tracks, names, told, strict=True):
-        found = int(np.isfinite(pixels).any(axis=0).sum()) // 2
-        if found < targets:
+        if (found := int(np.isfinite(pixels).any(axis=0).sum()) // 2) < targets:
             got = f"got {found or 'none'} in any frame: {'; '.join((*causes, still))}"
             raise Refused(f"paths: {name} must show {wanted}, {got}", "track", tracks)
 

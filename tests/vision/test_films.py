@@ -70,8 +70,7 @@ def test_a_ball_that_hardly_leaves_its_own_ground_in_compressed_film(tmp_path, s
     truth = [160, 90] + 15 * np.column_stack([0 * ANGLE, np.cos(2 * ANGLE)])[:70]
     ground = texture(np.random.default_rng(seed), 320, 180)
     path = painted(tmp_path, ground, ball(truth, 9, (230, 200, 30)), 70, 1.0, 1, "mp4v")
-    _, error = followed(path, truth)
-    assert np.nanmax(error) < 1
+    assert np.nanmax(followed(path, truth)[1]) < 1
 
 
 def test_a_large_ball_that_never_leaves_its_own_ground(tmp_path):
@@ -102,18 +101,20 @@ def test_a_colour_that_the_film_shows_mixed_with_its_ground_is_not_lost(tmp_path
         assert any("colour (230, 40, 110)" in doubt for doubt in lost.warnings)
 
 
-@pytest.mark.parametrize("plain", [True, False])
-def test_a_bob_is_told_from_its_string(tmp_path, plain):
+@pytest.mark.parametrize(("plain", "passed"), [(True, False), (False, False), (True, True)])
+def test_a_bob_is_told_from_its_string_and_who_walks_behind_it(tmp_path, plain, passed):
     ground = np.full((200, 240, 3), 178.0) if plain else texture(np.random.default_rng(4), 240, 200)
     swing = 0.6 * np.cos(2 * ANGLE)
     truth = [120, 10] + 150 * np.column_stack([np.sin(swing), np.cos(swing)])
 
     def draw(image, i):
+        if passed:  # by somebody whom the lower border cuts
+            cv2.rectangle(image, (210 - 2 * i, 60), (250 - 2 * i, 200), (87, 58, 48), -1)
         ends = (np.rint(16 * np.array(end)).astype(int) for end in ([120, 10], truth[i]))
         cv2.line(image, *map(tuple, ends), (60, 60, 60), 2, cv2.LINE_AA, 4)
         return disc(image, truth[i], 9, (210, 60, 30))
 
-    _, error = followed(painted(tmp_path, ground, draw, N), truth, least=0.9)
+    _, error = followed(painted(tmp_path, ground, draw, N), truth, least=0.7 if passed else 0.9)
     assert np.nanmax(error) < 2
 
 
@@ -245,8 +246,7 @@ def test_what_goes_on_beyond_the_window_is_not_the_whole_target(tmp_path):
         return disc(image, ROUND[i], 8, (40, 230, 110))
 
     path = painted(tmp_path, texture(rng, 240, 200), draw, N)
-    _, error = followed(path, ROUND, around(ROUND, 18))
-    assert np.nanpercentile(error, 95) < 1.5
+    assert np.nanpercentile(followed(path, ROUND, around(ROUND, 18))[1], 95) < 1.5
 
 
 def test_where_two_things_move_alike_it_says_so_and_a_hint_decides(tmp_path):

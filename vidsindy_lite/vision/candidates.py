@@ -186,7 +186,7 @@ class Candidates(NamedTuple):
 
     `frame` (m,); `place` (m, 2) in the first frame; `centre` (m, 2), `box` (m, 4) (left, top,
     width, height) and `area` (m,) in the frame; the mean `colour` (m, 3) and that of the ground
-    `behind` (m, 3) it; `quality` (m,), how plain it is.
+    `behind` (m, 3) it; `quality` (m,), how plain it is; `clear` (m,), of the border.
     """
 
     frame: Ints
@@ -197,6 +197,7 @@ class Candidates(NamedTuple):
     colour: Floats
     behind: Floats
     quality: Floats
+    clear: Bools
 
     @property
     def size(self) -> Floats:
@@ -319,10 +320,10 @@ def components(
     box = (stats[:, :4] + [left, top, 0, 0]).astype(float)
     quality = worth * np.tanh(mean / 4) * np.minimum(area / (0.7 * box[:, 2:].prod(axis=1)), 1)
     quality *= np.minimum(area / 8, 1)
-    cut = (box[:, :2] <= 0).any(axis=1) | (box[:, :2] + box[:, 2:] >= mask.shape[::-1]).any(axis=1)
-    quality *= np.where(cut, 0.6, 1) * np.where(shadowed(colour, behind), 0.5, 1)
+    clear = (box[:, :2] > 0).all(axis=1) & (box[:, :2] + box[:, 2:] < mask.shape[::-1]).all(axis=1)
+    quality *= np.where(clear, 1, 0.6) * np.where(shadowed(colour, behind), 0.5, 1)
     first = np.zeros(len(order), int)
-    return Candidates(first, centre, centre, box, area, colour, behind, quality)
+    return Candidates(first, centre, centre, box, area, colour, behind, quality, clear)
 
 
 def _means(colours: Image, part: Ints, count: int) -> Floats:
@@ -438,7 +439,7 @@ def _penalty(
 def plainest_paths(seen: Candidates, most: int = 3, *, away: bool = False) -> list[Motion]:
     """Several paths (see `best_path`) that have nothing in common, the plainest first.
 
-    What counts is the value of each, as far as it travels and keeps its outline.
+    What counts is the value of each, as far as it travels, keeps its outline and is seen whole.
     """
     left, found = np.arange(len(seen.frame)), []
     for _ in range(most):
@@ -446,7 +447,8 @@ def plainest_paths(seen: Candidates, most: int = 3, *, away: bool = False) -> li
         if len(rows) < 5:
             break
         rows = left[rows]
-        found.append(Motion(rows, value * _travels(seen, rows) * _rigid(seen, rows)))
+        clear = np.clip(3 * seen.clear[rows].mean(), 0.25, 1)  # what the border cuts has no place
+        found.append(Motion(rows, value * clear * _travels(seen, rows) * _rigid(seen, rows)))
         box = np.full((seen.frame[-1] + 1, 4), np.nan)
         box[seen.frame[rows]] = seen.box[rows]
         box, own = box[seen.frame[left]], seen.box[left]

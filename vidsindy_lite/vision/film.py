@@ -341,7 +341,7 @@ def _together(
             quality[near] += 0.5 * looks.fit[i]
     place = carry(maps[at], centre)
     alike = Candidates(at, place, centre, np.column_stack([centre - box[:, 2:] / 2, box[:, 2:]]),
-                       area, colour, colour, worth)  # fmt: skip
+                       area, colour, colour, worth, at >= 0)  # fmt: skip
     alike.quality[at == first] += TOLD
     kept = (seen.frame != first) | (not told)
     return Candidates.joined([seen._replace(quality=quality).only(kept), alike])

@@ -154,7 +154,7 @@ def link(sightings: Sequence[Sequence[Detection]]) -> tuple[Floats, Floats]:
     size = np.array([d.size for _, d in flat]).reshape(-1, 2)
     sure, black = np.array([d.confidence for _, d in flat]), np.zeros((len(flat), 3))
     box = np.hstack([centre - size / 2, size])
-    seen = Candidates(frame, centre, centre, box, size.prod(axis=1), black, black, sure)
+    seen = Candidates(frame, centre, centre, box, size.prod(axis=1), black, black, sure, sure > 0)
     rows = best_path(seen, away=True).rows
     pixels, confidence = np.full((len(sightings), 2), np.nan), np.zeros(len(sightings))
     pixels[frame[rows]], confidence[frame[rows]] = centre[rows], sure[rows]
