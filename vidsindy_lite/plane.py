@@ -307,27 +307,29 @@ def _flight(pixels: Floats, start: int, t: Floats, x: Floats) -> tuple[Floats, s
     """The part of a track that goes farthest on a parabola, to its noise, and what to say of it.
 
     It starts at some frame, and is at places in the plane, (n, 2), at some times. What comes before
-    and after is another motion, as that of a hand, if it is off the parabola by half as much as the
-    part goes: a drag, or a plane askew, bends it less. What a slope bears falls aside.
+    and after is another motion, as that of a hand, if what acts there differs by more than the
+    pull: that of a drag, or of a plane askew, is less. What a slope bears falls aside.
     """
     seen, first = np.flatnonzero(np.isfinite(x).all(axis=1)), 0
-    best = 0.0, 0, 0
+    best, fall = (0.0, 0, 0), np.zeros((3, 2))
     for last in range(len(seen)):
         while last - first >= 9 and not _falls(t[own := seen[first : last + 1]], x[own]):
             first += 1
         if last - first >= 9:
-            reach = float(np.linalg.norm(np.ptp(x[seen[first : last + 1]], axis=0)))
-            best = max(best, (reach, first, last))
-    reach, first, last = best
-    if not reach:
+            parabola = polyfit(t[own] - t[own[0]], x[own], 2)
+            upright = np.abs(parabola[2, 0]) < np.tan(HELD) * -parabola[2, 1]
+            far = float(np.linalg.norm(np.diff(x[own], axis=0), axis=1).sum()), first, last
+            if upright and far > best:
+                best, fall = far, parabola
+    if not best[-1]:
         return pixels, ""
-    own = seen[first : last + 1]
-    since = t - t[own[0]]
-    parabola = polyfit(since[own], x[own], 2)
-    off = np.linalg.norm(polyval(since[seen], parabola).T - x[seen], axis=1)
-    whole = np.linalg.norm(np.ptp(x[seen], axis=0))  # any smooth motion falls so for a while
-    upright = np.abs(parabola[2, 0]) < np.tan(HELD) * -parabola[2, 1]
-    if off.max() <= reach / 2 or reach <= whole / 2 or not upright:
+    own = seen[best[1] : best[2] + 1]
+    since, reach = t[seen] - t[own[0]], np.linalg.norm(np.ptp(x[own], axis=0))
+    off = np.linalg.norm(polyval(since, fall).T - x[seen], axis=1)
+    beyond = np.maximum(0, np.maximum(-since, since - np.ptp(t[own])))
+    other = off > -fall[2, 1] * beyond**2 + 5 * np.median(off[beyond == 0])
+    # Any smooth motion falls so for a while.
+    if reach <= np.linalg.norm(np.ptp(x[seen], axis=0)) / 3 or not other[beyond > 0].any():
         return pixels, ""
     begins, ends = start + own[[2, -3]]  # the test hardly sees what the ends do
     told = f"it flies freely from frame {begins} to {ends}, which alone are counted"

@@ -204,7 +204,6 @@ def homogeneous(
     # What errors that all samples share may leave of them is no reason to doubt.
     freed = (one.freed(since, x, modes, noise) for one in (flight, richer, law))
     unsure = doubts(flight, richer, law) and doubts(*freed)
-    unsure = *unsure, *_outlying_ends(t, x, modes)
     return replace(found, warnings=unsure, path=path)
 
 
@@ -256,34 +255,6 @@ def _misfit(x: Floats, flight: Flight, noise: float, most: float = 5.0) -> tuple
     return (
         f"a flight leaves {flight.error:.3g}, and the path scatters by {scatter:.3g} from sample "
         "to sample: something else pulls, the track jumps or lacks frames, or errors are smooth",
-    )
-
-
-@np.errstate(over="ignore", invalid="ignore")  # of drags far beyond those that the data allow
-def _outlying_ends(t: Floats, x: Floats, modes: Floats) -> tuple[str, ...]:
-    """Places that are no part of the flight, with drag, which all but the two ends tell.
-
-    A tenth of the places on either side is foretold from those between: a hand or the ground may
-    have had the target there, and few such places bend the whole flight.
-    """
-    since, out = t - t.mean(), max(1, len(t) // 10)
-    free = np.ones(3 * x.shape[1] + 1, dtype=bool)
-    if x[out:-out].size < len(free) + 4:  # hardly any is left over to tell errors
-        return ()
-    inner = Flight.fitted(since[out:-out], x[out:-out], free)
-    sizes, axes = np.linalg.eigh(inner.covariance)
-    told, moves = places(since, inner.theta), np.sqrt(np.maximum(sizes, 0.0)) * axes
-    unsure = [places(since, inner.theta + one) - told for one in moves.T]
-    moved = inner.moved(since[out:-out], x[out:-out], modes[:, out:-out])
-    unsure += [*bent(inner, since, modes, moved)]
-    spread = np.sqrt(inner.error**2 + np.square(unsure).sum(axis=0))
-    strange = t[(np.abs(x - told) > GROSS * spread).any(axis=1)]
-    if not len(strange):
-        return ()
-    return (
-        f"{len(strange)} of {len(t)} places, the first at t = {strange[0]:.4g} and the last at "
-        f"{strange[-1]:.4g}, are no part of the flight that the others tell (the target may be in "
-        "a hand there, or on the ground): leave them out",
     )
 
 
