@@ -83,7 +83,8 @@ class Flight:
         Their sizes are the likeliest beside samples of some noise; of the scale, for one, any
         motion would be an error, were it large enough.
         """
-        bends = bent(self, t, modes, self.moved(t, x, modes)).reshape(len(modes), x.size)
+        fits = [Flight.fitted(t, x + mode, self.free) for mode in modes]
+        bends = np.reshape([fit.left - self.left for fit in fits], (len(modes), x.size))
         likely = bends @ bends.T + noise**2 * np.eye(len(modes))
         sizes = np.clip(np.linalg.solve(likely, bends @ self.left.ravel()), -3, 3)
         return replace(self, left=self.left - (sizes @ bends).reshape(self.left.shape))
@@ -104,14 +105,6 @@ def places(t: Floats, theta: Floats, slope: bool = False) -> Floats:
     near = np.abs(z) < 1e-4  # there the difference has lost its digits, and the series has not
     second = t**2 * np.where(near, 0.5 + z / 6, (exprel(z) - 1) / np.where(near, 1.0, z))
     return start + np.outer(first, velocity) + np.outer(second, force)
-
-
-def bent(flight: Flight, t: Floats, modes: Floats, moved: Floats) -> Floats:
-    """What of errors that all samples share no flight takes up that they move so, (k, n, m)."""
-    here = places(t, flight.theta)
-    each = zip(modes, moved, strict=True)
-    flown = [mode - (places(t, flight.theta + move) - here) for mode, move in each]
-    return np.reshape(flown, modes.shape)
 
 
 def coefficients_of(theta: Floats, exponents: Ints) -> Floats:
