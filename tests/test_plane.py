@@ -152,19 +152,14 @@ def test_four_marks_of_a_rectangle_that_is_seen_askew():
         ({"length_error": 0.02}, "length_error: must be given with length or corners"),
         ({"fps": 0}, "fps: must be positive"),
         ({"length": STICK}, "fps: must be given"),
+        ({}, "throw.mp4 must hold the 60 frames that its header"),
     ],
 )
-def test_what_is_no_scale_is_refused(monkeypatch, given, message):
+def test_what_is_no_scale_or_was_cut_off_is_refused(monkeypatch, given, message):
     rate = 0.0 if given == {"length": STICK} else 30.0
-    filmed(monkeypatch, pixels_of(flight()[1]), fps=rate)
+    filmed(monkeypatch, pixels_of(flight()[1]), rate, None if given else 60)
     with pytest.raises(ValueError, match=message):
         vl.discover_from_video("throw.mp4", **given)
-
-
-def test_a_film_that_was_cut_off_is_told(monkeypatch):
-    filmed(monkeypatch, pixels_of(flight()[1]), frames=60)
-    with pytest.raises(ValueError, match="throw.mp4 must hold the 60 frames that its header"):
-        vl.discover_from_video("throw.mp4", STICK)
 
 
 def test_the_error_of_the_length_is_that_of_g_whichever_mark_is_first(monkeypatch):
