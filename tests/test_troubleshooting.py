@@ -165,10 +165,9 @@ def jumping(studio):
 
 def thrown(studio):
     """From a hand, at a length that is wrong by a third."""
-    t = np.arange(-12, 22)[:, None] / 30
+    t, table = np.arange(-12, 22)[:, None] / 30, studio.folder / "throw.csv"
     x = np.where(t < 0, ((1 + t / 0.4) ** 3 - 1) * 0.4 / 3, t) * [1.5, 5]
     x -= np.maximum(t, 0) ** 2 * [0, 9.81 / 2]
-    table = studio.folder / "throw.csv"
     rows = x * [200, -200] + np.random.default_rng(0).normal([100, 400], 0.2, x.shape)
     np.savetxt(table, rows, "%.3f", ",", header="u,v", comments="")
     return told(vl.discover_from_video, table, (0, 300, 0, 100, 1.3), fps=30)

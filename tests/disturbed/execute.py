@@ -1,7 +1,6 @@
 """Execute a notebook as plain Python, in its quick profile or with other settings, on no paper.
 
-Its figures are laid out and drawn, see `undisplayed.py`, its tables go to VIDSINDY_FIGURES, as from
-a run through papermill, in a part of its time. Sweeps work in this very process.
+Figures are drawn, see `undisplayed.py`, tables go to VIDSINDY_FIGURES, sweeps work in this process.
 """
 
 import importlib
