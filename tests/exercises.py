@@ -1,7 +1,7 @@
 """Exercises, made of notebooks/solutions/ by `python tests/exercises.py`, `--force` of all.
 
-A cell with the tag `solution` is not in the exercise: text is left out, code becomes a blank cell,
-which says what names the check behind it looks at. The check says whether what they are is right.
+Of cells with the tag `solution` text is left out, code becomes a blank cell with the names that the
+check behind it looks at, which says whether what they are is right.
 """
 
 import ast

@@ -1,7 +1,6 @@
 """Writes an ONNX file of the shape of a YOLO-v8 detector, without the onnx package.
 
-A real one comes from somebody's training. This one is a single convolution that sees red, and lays
-its answers out as YOLO-v8 does: one image (1, 3, height, width) in, (1, 5, anchors) out.
+It is a single convolution that sees red: one image (1, 3, height, width) in, (1, 5, anchors) out.
 """
 
 import struct

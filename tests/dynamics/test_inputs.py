@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
 from vidsindy_lite import Library, PolynomialSystem
-from vidsindy_lite.dynamics.library import Input
+from vidsindy_lite.dynamics.library import Input, jumps
 from vidsindy_lite.dynamics.result import Discovery
 
 T = np.linspace(0, 40, 600)
@@ -233,6 +233,7 @@ def test_samples_that_jump_are_held_and_that_is_told():
     assert len(Input.of("u", CLOCK, np.full(len(CLOCK), 0.3)).unsure) == 0  # without a word
     s = np.arange(0.05, 39, 0.1)
     np.testing.assert_array_equal(told(s), relay(s))
+    np.testing.assert_allclose(jumps(told, np.arange(0.0, 40, 9.5)), SWITCHED)  # two in one
     for hold in ("linear", "cubic"):  # who says so is not told
         assert not np.array_equal(Input.of("u", CLOCK, relay(CLOCK), hold)(s), relay(s))
 

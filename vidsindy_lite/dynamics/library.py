@@ -375,9 +375,21 @@ def jumps(value: Callable[[Floats], Floats], t: Floats, halvings: int = 30) -> F
     """Where a function of the time jumps between given times, (n,).
 
     Of each interval the half in which it changes more, again and again: what is continuous changes
-    less and less.
+    less and less. Where it jumps, what is before and after that is searched as well.
     """
-    low, high = t[:-1], t[1:]
+    found, low, high = np.zeros(0), t[:-1], t[1:]
+    for _ in range(3):
+        before, after = _one_jump(value, low, high, halvings, 1e-9 * np.ptp(value(t)))
+        at = np.isfinite(after)
+        found = np.append(found, after[at])
+        low, high = np.append(low[at], after[at]), np.append(before[at], high[at])
+    return np.sort(found)
+
+
+def _one_jump(
+    value: Callable[[Floats], Floats], low: Floats, high: Floats, halvings: int, least: float
+) -> tuple[Floats, Floats]:
+    """Times just before and after a jump in each interval, NaN where there is none."""
     below, above = value(low), value(high)
     changes = []
     for _ in range(halvings):
@@ -387,8 +399,8 @@ def jumps(value: Callable[[Floats], Floats], t: Floats, halvings: int = 30) -> F
         high, above = np.where(left, middle, high), np.where(left, here, above)
         low, below = np.where(left, low, middle), np.where(left, below, here)
         changes.append(np.abs(above - below))
-    least = 1e-9 * np.ptp(value(t))  # more than rounding
-    return high[(changes[-1] > changes[halvings // 2] / 2) & (changes[-1] > least)]
+    there = (changes[-1] > changes[halvings // 2] / 2) & (changes[-1] > least)  # than rounding
+    return np.where(there, low, np.nan), np.where(there, high, np.nan)
 
 
 # --------------------------------------------------------------------------------------------------
