@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -707,7 +708,8 @@ def _height_error(flat: Floats, height: Floats, place: Floats) -> float:
 def _axes(away: Floats, zero: ArrayLike | None, span: Floats) -> Floats:
     """Orthonormal directions in a span (k, d): the first towards zero, then by how wide the motion.
 
-    The largest component of each but the first, or of the normal of a circle, is positive.
+    The largest component of each but the first is positive. On a circle the angle grows from the
+    earlier to the later axis of the coordinate plane next to it, as from x to y.
     """
     first = away.mean(axis=0) if zero is None else check_vector("zero", zero, away.shape[1])
     within = span.T @ (span @ first)
@@ -719,7 +721,9 @@ def _axes(away: Floats, zero: ArrayLike | None, span: Floats) -> Floats:
     rest = rest - np.outer(rest @ first, first)
     _, directions = np.linalg.eigh(rest.T @ rest)
     others = directions.T[::-1][: len(span) - 1]
-    wide = ((0, 0), (0, 3 - len(first)))
-    told = others if len(span) > 2 else np.cross(*np.pad([[first], others], ((0, 0), *wide)))
+    told, both = others, np.vstack([first, others])
+    if len(span) == 2:
+        pairs = map(list, combinations(range(len(first)), 2))
+        told = np.linalg.det([both[:, pair] for pair in pairs])[None]
     signs = np.sign(told[np.arange(len(told)), np.abs(told).argmax(axis=1)])
     return np.vstack([first, others * signs[:, None]])
