@@ -360,8 +360,7 @@ def _let_go(pixels: Floats, start: int) -> tuple[Floats, str]:
     step = max(0.05 * apart.max(), 2.0)  # pixels, more than a hand trembles or a track errs
     once, fourth = (seen[int((apart > far).argmax())] for far in (step, 4 * step))
     released = 2 * once - fourth
-    noise = 3 * np.median(apart[:10])
-    moved = apart[seen < released].max(initial=0.0) > 0.2 * step + noise
+    moved = apart[seen < released].max(initial=0.0) > 0.2 * step + 3 * np.median(apart[:10])
     if moved or apart.max() <= 4 * step or released - seen[0] < max(5, 2 * (fourth - once)):
         return pixels, ""
     told = f"it rests until frame {start + released}: counted from {start + once} on"

@@ -377,30 +377,24 @@ def jumps(value: Callable[[Floats], Floats], t: Floats, halvings: int = 30) -> F
     Of each interval the half in which it changes more, again and again: what is continuous changes
     less and less. Where it jumps, what is before and after that is searched as well.
     """
-    found, low, high = np.zeros(0), t[:-1], t[1:]
+    found, starts, ends = np.zeros(0), t[:-1], t[1:]
+    least = 1e-9 * np.ptp(value(t))  # more than rounding
     for _ in range(3):
-        before, after = _one_jump(value, low, high, halvings, 1e-9 * np.ptp(value(t)))
-        at = np.isfinite(after)
-        found = np.append(found, after[at])
-        low, high = np.append(low[at], after[at]), np.append(before[at], high[at])
+        low, high, changes = starts, ends, []
+        below, above = value(low), value(high)
+        for _ in range(halvings):
+            middle = (low + high) / 2
+            here = value(middle)
+            left = np.abs(here - below) > np.abs(above - here)
+            high, above = np.where(left, middle, high), np.where(left, here, above)
+            low, below = np.where(left, low, middle), np.where(left, below, here)
+            changes.append(np.abs(above - below))
+        there = (changes[-1] > changes[halvings // 2] / 2) & (changes[-1] > least)
+        if not there.any():
+            break
+        found = np.append(found, high[there])
+        starts, ends = np.append(starts[there], high[there]), np.append(low[there], ends[there])
     return np.sort(found)
-
-
-def _one_jump(
-    value: Callable[[Floats], Floats], low: Floats, high: Floats, halvings: int, least: float
-) -> tuple[Floats, Floats]:
-    """Times just before and after a jump in each interval, NaN where there is none."""
-    below, above = value(low), value(high)
-    changes = []
-    for _ in range(halvings):
-        middle = (low + high) / 2
-        here = value(middle)
-        left = np.abs(here - below) > np.abs(above - here)
-        high, above = np.where(left, middle, high), np.where(left, here, above)
-        low, below = np.where(left, low, middle), np.where(left, below, here)
-        changes.append(np.abs(above - below))
-    there = (changes[-1] > changes[halvings // 2] / 2) & (changes[-1] > least)  # than rounding
-    return np.where(there, low, np.nan), np.where(there, high, np.nan)
 
 
 # --------------------------------------------------------------------------------------------------
