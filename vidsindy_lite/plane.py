@@ -329,7 +329,7 @@ def _flight(pixels: Floats, start: int, t: Floats, x: Floats) -> tuple[Floats, s
     beyond = np.maximum(0, np.maximum(-since, since - np.ptp(t[own])))
     other = off > -fall[2, 1] * beyond**2 + 5 * np.median(off[beyond == 0])
     # Any smooth motion falls so for a while.
-    if reach <= np.linalg.norm(np.ptp(x[seen], axis=0)) / 3 or not other[beyond > 0].any():
+    if reach <= np.linalg.norm(np.ptp(x[seen], axis=0)) / 2 or not other[beyond > 0].any():
         return pixels, ""
     begins, ends = start + own[[2, -3]]  # the test hardly sees what the ends do
     told = f"it flies freely from frame {begins} to {ends}, which alone are counted"
