@@ -12,7 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.polynomial.polynomial import polyfit, polyval
@@ -72,6 +72,11 @@ class PlaneDiscovery(VideoDiscovery):
     """
 
     unit: str
+
+    def doubted(self, doubts: Sequence[str]) -> Self:
+        """The same with more warnings, which come first, and which the law keeps."""
+        law = replace(self.discovery, warnings=(*doubts, *self.warnings))
+        return replace(self, warnings=law.warnings, discovery=law)
 
     @cached_property
     def leaning(self) -> float:
@@ -230,8 +235,7 @@ def discover_from_video(
                 "count; and before a plain wall, which does not show how a hand trembles, the "
                 "phone has to stand on something"
             )
-        law = replace(found.discovery, warnings=(*contradicted, *found.warnings))
-        return replace(found, warnings=law.warnings, discovery=law)
+        return found.doubted(contradicted)
 
     if frames is not None:
         return law_of(pixels)
@@ -250,8 +254,7 @@ def discover_from_video(
                 fall = f": if {told.partition(',')[0]}, "
                 doubt = (one for one in other.warnings if "flies or swings freely" in one)
                 also = [one.replace(": ", fall, 1) for one in doubt]
-                law = replace(found.discovery, warnings=(*also, *found.warnings))
-                found = replace(found, warnings=law.warnings, discovery=law)
+                found = found.doubted(also)
     return found
 
 
@@ -313,10 +316,11 @@ def _flight(pixels: Floats, start: int, t: Floats, x: Floats) -> tuple[Floats, s
     seen, first = np.flatnonzero(np.isfinite(x).all(axis=1)), 0
     best, fall = (0.0, 0, 0), np.zeros((3, 2))
     for last in range(len(seen)):
-        while last - first >= 9 and not _falls(t[own := seen[first : last + 1]], x[own]):
-            first += 1
-        if last - first >= 9:
-            parabola = polyfit(t[own] - t[own[0]], x[own], 2)
+        parabola = None
+        while last - first >= 9 and parabola is None:
+            parabola = _parabola(t[own := seen[first : last + 1]], x[own])
+            first += parabola is None
+        if parabola is not None:
             upright = np.abs(parabola[2, 0]) < np.tan(HELD) * -parabola[2, 1]
             far = float(np.linalg.norm(np.diff(x[own], axis=0), axis=1).sum()), first, last
             if upright and far > best:
@@ -336,16 +340,19 @@ def _flight(pixels: Floats, start: int, t: Floats, x: Floats) -> tuple[Floats, s
     return _between((begins, ends), pixels, start), told
 
 
-def _falls(t: Floats, x: Floats) -> bool:
-    """Whether three powers of the time more than a parabola explain no more of places than chance.
+def _parabola(t: Floats, x: Floats) -> Floats | None:
+    """The parabola of places, (3, 2), from the first time on; None if they are on none.
 
-    F-test at one in a thousand, of errors that may last.
+    Three powers of the time more explain no more than chance: F-test at one in a thousand, of
+    errors that may last.
     """
-    n, t = len(t), 2 * (t - t[0]) / np.ptp(t) - 1
-    two, five = (x - polyval(t, polyfit(t, x, degree)).T for degree in (2, 5))
+    n, since = len(t), t - t[0]
+    own, more = polyfit(since, x, 2), polyfit(since / since[-1], x, 5)
+    two, five = x - polyval(since, own).T, x - polyval(since / since[-1], more).T
     noise = (five**2).sum(axis=0) / (n - 6) + (CLEANEST * x.std()) ** 2
     gain = ((two**2).sum(axis=0) - (five**2).sum(axis=0)) / 3
-    return bool((gain <= fdtri(3, n - 6, 0.999) * inflation([five]) * noise).all())
+    on_it = (gain <= fdtri(3, n - 6, 0.999) * inflation([five]) * noise).all()
+    return np.asarray(own, float) if on_it else None
 
 
 def _let_go(pixels: Floats, start: int) -> tuple[Floats, str]:
