@@ -144,7 +144,8 @@ class Problem:
     @property
     def origin(self) -> Floats:
         """The origin of the data's frame, shape (d,)."""
-        return self.units.standard(np.zeros(self.d))
+        timeless = np.arange(self.d) < self.form.states  # functions of the time have their own
+        return np.where(timeless, self.units.standard(np.zeros(self.d)), 0.0)
 
     @cached_property
     def box(self) -> tuple[Floats, Floats]:
@@ -222,11 +223,13 @@ class Problem:
     def jumps(self) -> list[Floats]:
         """Times at which an input of the law jumps, of each trajectory: there its slope does."""
         found = []
-        for t, _ in self.trajectories:
+        for t, _ in self.measured:
             beside = 1e-11 * (t[-1] - t[0]) * np.array([-1, 1])  # also one that it begins with
             times = np.concatenate([t[:1] + beside[0], t, t[-1:] + beside[1]])
-            every = [jumps(partial(f.at, d=self.d), times) for f in self.functions if f.of_time]
-            found.append(np.unique(np.concatenate([np.zeros(0), *every])))
+            every = [
+                jumps(partial(f.at, d=self.d), times) for f in self.form.functions if f.of_time
+            ]
+            found.append(np.unique(np.concatenate([np.zeros(0), *every])) / self.units.time)
         return found
 
     def collocation(self, segments: Sequence[Segment], noise: Floats | None = None) -> Collocation:
@@ -425,7 +428,8 @@ def with_unseen(
     values = np.concatenate([whole(curve, curve.t[DEGREE:-DEGREE]) for curve in curves])
     centre, scale = np.zeros(d), np.sqrt((values**2).mean(axis=0))
     centre[measured], scale[measured] = units.centre, units.scale
-    scale[-1] = units.time if timed else scale[-1]
+    if timed:  # small numbers, as of large ones rounding takes the slope
+        centre[-1], scale[-1] = values[:, -1].mean(), units.time
 
     def standard(curve: BSpline, t: Floats) -> Floats:
         x = (whole(curve, t) - centre) / scale
