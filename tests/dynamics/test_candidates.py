@@ -150,7 +150,8 @@ def test_a_sum_is_a_union():
 @pytest.mark.parametrize(
     ("library", "words"),
     [
-        (Library(), "library: must hold a term"),
+        (Library(), "library: must hold a term, got none"),
+        (Library.rational(1), "library: must hold a term above the fraction line, got none"),
         ("polynomial(3)", "library: must be of type Library"),
         (Library.terms({"a": lambda q: q}), r"arguments of 'a' must be named .*\(x, y\), .* got q"),
         (Library.fourier(10**6), r"library: must have at most 1000 terms, got [246]0"),

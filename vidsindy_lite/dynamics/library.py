@@ -698,8 +698,9 @@ def check_library(degree: int | None, library: Library | None) -> Library:
     check_instance("library", library, Library)
     if degree is not None:
         raise ValueError(f"degree: must not be given with a library, got {degree} and {library}")
-    if library == Library():
-        raise ValueError("library: must hold a term, got none")
+    if replace(library, denominators=0) == Library():
+        above = " above the fraction line" * bool(library.denominators)
+        raise ValueError(f"library: must hold a term{above}, got none")
     return library
 
 
