@@ -160,8 +160,7 @@ def test_a_sum_is_a_union():
         (Library.terms({"x": lambda x: x**2}), "a term must have a name of its own, got 'x' twice"),
         (Library.polynomial(1) + Library.terms({"1": lambda x: x**2}), "of its own, got '1' twice"),
         (Library.terms({"s": lambda x: math.sin(x)}), "'s' must take and return arrays .* Type"),
-        (Library.terms({"a": lambda x: 1.0}), r"'a' must return an array of the shape"),
-        (Library.terms({"a": lambda x: [x, x, x]}), r"'a' must return .* 2 of these, .* .3, 2."),
+        (Library.terms({"a": lambda x: [x, x, x]}), r"return an array .* 2 of these, .* .3, 2."),
         (Library.terms({"a": lambda x: np.ones(2)}), r"shape .2,. for n = 2 and .2,. for n = 97"),
         (Library.terms({"a": lambda x: np.log(-2 - x)}), r"a must be .* at \(1, "),
         (
