@@ -242,8 +242,8 @@ save_table("tour_score", rows, caption=caption)
 # With a law one can compute what happens next. We start at the first frame and let the discovered law
 # and the true one run. Where a system is chaotic, as Lorenz' is, two paths that differ in the sixth digit
 # separate exponentially, so a forecast ends sooner or later, whoever makes it. We call it good as long as the
-# distance is below a tenth of the motion's standard deviation (of the coordinate that moves most), and count in periods: the time in which the
-# motion typically comes near its start again, 100 frames of these videos.
+# distance is below a tenth of the motion's standard deviation (of the coordinate that moves most), and count in periods: the time scale
+# that the `dysts` collection gives a system, of Lorenz' two loops, 100 frames of these videos.
 
 # %%
 period = shot.truth.period

@@ -244,9 +244,9 @@ def row(pixels, observed, method):
 # %%
 cases = {"exact": tracks, "rounded": rounded, f"{pixel_noise:g} px noise": noisy}
 methods = {
-    "paper": cameras.learn_cameras_eq4,
-    "gradient": learn_cameras_lbfgs,
-    "joint": learn_cameras,
+    "Eq. (4)": cameras.learn_cameras_eq4,
+    "Eq. (4), gradients": learn_cameras_lbfgs,
+    "joint fit": learn_cameras,
 }
 rows = [row(name, observed, method) for name, observed in cases.items() for method in methods]
 for entry in rows:  # so small a number says nothing but "rounding"
@@ -278,8 +278,7 @@ def errors_of(method, noise, number):
 
 
 # %%
-names = {"paper": "Eq. (4)", "joint": "joint fit"}
-errors = {name: errors_of(method, pixel_noise, trials) for method, name in names.items()}
+errors = {name: errors_of(name, pixel_noise, trials) for name in ("Eq. (4)", "joint fit")}
 deviation = {name: error.std(axis=0).max(axis=0) for name, error in errors.items()}
 by_chance = 1 + 2 / np.sqrt(2 * trials)  # two standard errors of a standard deviation
 assert (deviation["joint fit"] < by_chance * deviation["Eq. (4)"] + 1e-9).all()
@@ -318,8 +317,8 @@ save_figure("cameras_trials", fig, caption=caption, numbers=errors)
 noise = np.array([0.03, 0.1, 0.3, 1.0]) * min(10.0, np.std(tracks, axis=1).min() / 5)
 repeats = max(trials // 2, 10)
 scale_errors = {
-    name: np.array([errors_of(method, sigma, repeats)[:, 1, 0] for sigma in noise])
-    for method, name in names.items()
+    name: np.array([errors_of(name, sigma, repeats)[:, 1, 0] for sigma in noise])
+    for name in errors
 }
 bias = {name: np.nanmean(error[-1]) for name, error in scale_errors.items()}
 assert abs(bias["joint fit"]) < abs(bias["Eq. (4)"])

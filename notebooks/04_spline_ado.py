@@ -32,8 +32,8 @@
 # **What you need**: least squares. The trajectory is computed here, in the paper's reference frame, and
 # made noisy, so that the true law is known. [The next notebook](04b_the_search.ipynb) is about which terms are the law.
 #
-# **Covers** Section "Equation discovery", Eq. (3), (7)-(10), and the appendix "Alternate Direction
-# Optimization", Eq. (S8)-(S9).
+# **Covers** Sections "Cubic B-Splines", "Equation discovery" and "Network training", Eq. (3), (7)-(10), and the appendix
+# "Alternate Direction Optimization", Eq. (S8)-(S9).
 
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
@@ -84,7 +84,7 @@ print(truth.text())
 # %% [markdown]
 # ## Cubic B-splines
 #
-# The curve is a sum of basis functions, Eq. (3), one control point each:
+# The curve is a sum of basis functions $G_{i,3}$, Eq. (3), the columns of $\mathbf G$, one control point each:
 #
 # $$\mathbf x(t)=\mathbf G(t)\,\mathbf P,\qquad \dot{\mathbf x}(t)=\dot{\mathbf G}(t)\,\mathbf P,\qquad
 # \mathbf P\in\mathbb R^{r\times3}.$$
@@ -121,8 +121,8 @@ save_figure("solver_basis", fig, caption=caption, numbers={"t": fine, "basis": b
 # Where do they come from? From steps: a function of degree 0 is one between two knots. Each of a higher degree is a
 # blend of two neighbours of the degree below (Cox, de Boor),
 #
-# $$B_{i}^{k}(t)=w_i^k(t)\,B_i^{k-1}(t)+\bigl(1-w_{i+1}^k(t)\bigr)\,B_{i+1}^{k-1}(t),\qquad
-# w_i^k(t)=\frac{t-u_i}{u_{i+k}-u_i},$$
+# $$G_{i,k}(t)=w_{i,k}(t)\,G_{i,k-1}(t)+\bigl(1-w_{i+1,k}(t)\bigr)\,G_{i+1,k-1}(t),\qquad
+# w_{i,k}(t)=\frac{t-u_i}{u_{i+k}-u_i},$$
 #
 # with the knots $u$. Every step of the recursion is a line of numpy:
 
@@ -627,7 +627,7 @@ save_figure("solver_histories", fig, caption=caption, numbers=histories)
 # *The paper's optimiser (vermilion) soon gets to where its fixed $\alpha$ balances both losses, and stays there while
 # STRidge drops terms. Gauss-Newton (blue) begins with all terms of a library, prunes them,
 # moves the origin, and ends at seven terms, a data loss of one noise variance, and a law that holds. Terms (below) are counted in
-# all three equations together; dotted: how many a library has, and the true law.*
+# all three equations together, in the frame that an optimiser has at the moment (moved to that of the data, they are those of the table); dotted: how many a library has, and the true law.*
 
 # %%
 for name in dict.fromkeys(s.stage for s in ours.history):
@@ -639,8 +639,8 @@ assert ours.history[-1].terms == native.support.sum()
 # %% [markdown]
 # ## The weight of the law rises
 #
-# Gauss-Newton begins with all 30 terms up to degree 2, from a plain regression on the smoothing spline, and $\alpha$ rises in four
-# steps. What the weight does, one step after the other:
+# Gauss-Newton begins with all 30 terms up to degree 2, from a plain regression on the smoothing spline, and $\alpha$ rises. The
+# package takes two steps, 1 and 100, and goes on to $10^8$ with the terms that are left. What the weight does, in four smaller steps:
 
 # %%
 def start(t, x):
@@ -697,7 +697,7 @@ save_slider("solver_weight_slider", {name: fig for name, (fig, _) in pairs.items
 # * The normal matrix is banded in the curve, so its size grows as the number of samples and not as the square of it; what
 #   remains, the Schur complement, is the information about the law.
 #   <!-- by: np.abs(row - column).max() == 11; figure solver_step; np.allclose(schur, information -->
-# * Samples may be missing: what is lost is their number, as the law carries the curve across.
+# * Samples may be missing: a gap costs the samples in it and no more, as the law carries the curve across.
 #   <!-- by: off(smooth(t[lost]), clean[lost]) > 0.5; off(by_hand, inside) < 0.03; off(inside, clean[lost]) < 0.1 -->
 #
 # ## What the paper says, and what we found

@@ -30,8 +30,7 @@
 #
 # **What you need**: [notebook 04](04_spline_ado.ipynb), and what a covariance is.
 #
-# **Covers** Section "Equation discovery", Eq. (8), (10) and the pruning at the end of the appendix "Alternate Direction
-# Optimization".
+# **Covers** Section "Network training", Eq. (8), (10) and the pruning at its end.
 
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
@@ -85,7 +84,7 @@ assert score(found, truth).exact
 # ## Why not a threshold
 #
 # We take the first half of our solver apart, the fit of all 30 terms up to degree 2: from a plain regression on the smoothing
-# spline, the weight $\alpha$ of the law rises in four steps.
+# spline, the weight $\alpha$ of the law rises, here in four steps, in the package in two.
 
 # %%
 exponents = dynamics.monomial_exponents(3, 2)
@@ -206,7 +205,7 @@ assert all(share < shares["the search"] - 0.3 for way, share in shares.items() i
 
 # %% [markdown]
 # One step of the search takes a few lines, too: of all single drops, adds and swaps, take the one after which loss and
-# penalties are least. From all 30 terms on it drops the one with the smallest score, for a fit without it loses $z^2$.
+# penalties are least. From all 30 terms on it drops the one whose $z^2$, which a fit without it loses, is least over its penalty.
 
 # %%
 root = np.sqrt(np.diag(S))
@@ -241,7 +240,8 @@ print(f"drop {out}, add {into}: {cost:.1f} worse (the penalty of a term is about
 assert cost > 0
 
 # %% [markdown]
-# Cutting once is not what STLSQ and STRidge do: they cut, fit again, and cut again. Given the same
+# Cutting once is not what PySINDy's STLSQ (sequentially thresholded least squares) and the paper's STRidge do: they cut, fit
+# again, and cut again. Given the same
 # $\mathbf S$, that works better. For each of the seven systems, here is which threshold would
 # leave just the true terms.
 
@@ -462,7 +462,7 @@ for s in np.geomspace(0.001, 1, 13):
 # over more than a decade. Such a range of tolerated errors, over which the terms stay the same, is a *plateau*.
 # `discover` begins with a law at a large tolerated error, takes the widest plateau of the path around it, equation by
 # equation, fits the law with its terms alone, and follows the path around that law again, until it leads nowhere
-# else. Where it leads to no law, the first one is sought once more with all errors tolerated that have to be. The last path is `Discovery.path`. Where another plateau is more
+# else. If it ends at no law, the search begins once more, with a larger tolerated error. The last path is `Discovery.path`. Where another plateau is more
 # than half as wide, a warning names both.
 
 # %%
@@ -503,9 +503,9 @@ save_slider("solver_path_slider", figures, caption=caption, numbers={"tolerated"
 # A polynomial law is one in any frame, $\boldsymbol\Lambda(\Delta)=\mathbf T(\Delta)\boldsymbol\Lambda$, and so
 # is its information. So the unpruned fit need not be repeated to ask how many terms are significant at another
 # origin. Each term with score $z$, its coefficient over its standard error, counts smoothly: as nearly one if
-# it is far above its penalty, as nearly nothing if it is far below.
+# $z^2$ is far above a penalty, as nearly nothing if it is far below.
 #
-# $$N(\Delta)=\sum\frac{z^2}{z^2+\text{penalty}} .$$
+# $$N(\Delta)=\sum\frac{z^2}{z^2+\text{largest penalty}} .$$
 
 # %%
 x_axis = y_axis = np.linspace(-10, 30, 81)
@@ -546,8 +546,9 @@ save_figure("solver_origin", fig, caption=caption, numbers=numbers)
 # *Coefficients vanish along valleys: z in dy/dt and y in dz/dt where x = 10, x in dz/dt where y = 10. They
 # meet at (10, 10), where the law is sparsest, as far as the noise lets one tell. That origin was never told to the program.*
 #
-# From there the solver lets the offset join the fit, as unknowns that cost like terms. The law in the
-# frame of the data, and in its own:
+# The map is for the eye. The solver tries the origins at which coefficients of its law vanish, which is where valleys meet, takes
+# the cheapest law among them, and lets the offset join the fit, as unknowns that cost like terms. The law in the frame of the
+# data, and in its own:
 
 # %%
 print(found.equations())
@@ -695,7 +696,7 @@ caption = "How often the law is exact, and what the solver says about it, in thr
 save_figure("solver_failures_figure", fig, caption=caption, numbers=verdicts)
 
 # %% [markdown]
-# *Laws that are wrong (orange, vermilion) come with high noise or a library without the law's terms (degree 1); no rate of
+# *Laws that are wrong (orange, vermilion) come with high noise or a library without the law's terms (degree 1, of which the table has no errors); no rate of
 # sampling shown here costs a term. A warning (orange) is what one hopes for then; vermilion is a wrong law that nobody
 # flagged, light blue a right one that was doubted.*
 
@@ -731,8 +732,8 @@ assert not full or any(row["status"] == "ok" for row in rows)  # and wrong
 save_table("solver_pendulum", rows, caption=caption)
 
 # %% [markdown]
-# Where there is no warning, a polynomial fits the data as well as the truth would, to one variance of the
-# noise. No statistics can object to that. The advice is the usual one: another record, on another orbit.
+# The data loss is in variances of the noise, of which the truth would leave one. Where there is no warning, a polynomial fits the
+# data as well. No statistics can object to that. The advice is the usual one: another record, on another orbit.
 #
 # ## What we learned
 #

@@ -146,7 +146,7 @@ films = sweep(run_film, [FilmTask(name, n, frames) for name in names for n in tr
 # one frame at a time. So this is the regime of all main numbers: tracks of our **learned detector**, rounded to whole pixels,
 # cameras and path learned from them. It is off by some tenths of a pixel, by other amounts at other places. (To spare time it
 # looks in a square of 64 px around the target, along the grid of its anchors; what it says there is what it says in the whole
-# frame, to a tenth of a pixel or three.)
+# frame, to one to three tenths of a pixel.)
 #
 # `track` is more exact: its **sub-pixel** tracks are read to a thousandth of a pixel from clean and lossless
 # videos. What a method makes of those is of no use in a comparison with the paper, and says what the tracker costs.
@@ -154,7 +154,8 @@ films = sweep(run_film, [FilmTask(name, n, frames) for name in names for n in tr
 # All methods get the same paths in the reference frame, and the same 20 candidate terms:
 #
 # * **spline-ADO** is the paper's method with the paper's optimiser: gradient descent on spline, coefficients and offset,
-#   alternating with STRidge ([notebook 04](04_spline_ado.ipynb)). The paper does not print its two weights; one pair for all
+#   alternating with STRidge ([notebook 04](04_spline_ado.ipynb)). Unlike in the paper, the law is not asked for inside of gaps,
+#   where the first curve is a guess that spoils it. The paper does not print its two weights; one pair for all
 #   systems and conditions is chosen on samples that were held out ([notebook 06](06_robustness_and_ablation.ipynb));
 # * **Gauss-Newton** is `discover`: the same model and the same losses, with another optimiser and another choice of terms;
 # * the others stand in the paper's tables. Here are their settings.
@@ -233,6 +234,7 @@ both_optimisers = ("Gauss-Newton", "spline-ADO")
 ado = table_1[table_1.method == "spline-ADO"].set_index("system")
 plain = table_1[table_1.method == "PySINDy"].set_index("system")["l2 (e-2)"]
 assert right["sub-pixel", "Gauss-Newton"] == 1
+ours = results[results.method == "Gauss-Newton"]
 
 # %%
 if full:
@@ -240,14 +242,15 @@ if full:
     assert right["detector", "Gauss-Newton"] >= 0.9
     assert right["detector", "spline-ADO"] >= 0.75
     assert middle[list(both_optimisers)].max() < 2e-3
-    assert middle[["spline-ADO", "Model-A"]].max() < 5 * middle["Gauss-Newton"]
+    assert middle["spline-ADO"] < 3 * middle["Gauss-Newton"] > middle["Model-A"] / 5
+    assert 0.25 < (ours[ours.exact].status == "suspect").mean() < 0.5
     assert middle["PySINDy"] > 5 * middle["spline-ADO"]
     assert (ado["l2 (e-2)"] < ado["paper: l2 (e-2)"]).all()
     assert (plain[["NoseHoover", "WangSun"]] < 20).all()
 
 # %% [markdown]
 # **The paper's method works.** From sub-pixel tracks both optimisers of its model find every law in every trial. From whole
-# pixels here is one picture of all of them:
+# pixels Gauss-Newton is cautious: it doubts about two of five exact laws. Here is one picture of all methods, from both kinds of tracks:
 
 # %%
 pictured = both[both.trial == seed]
@@ -284,7 +287,6 @@ save_figure("discovery_methods", fig, caption=caption, numbers=numbers, toleranc
 # show where a term was lost or a false one found. The weak form depends on its random windows; this is one draw.*
 
 # %%
-ours = results[results.method == "Gauss-Newton"]
 rows = []
 for name, mine in ours.groupby("system", sort=False):
     shots = [film for film in films if film.truth.name == name]
@@ -295,7 +297,7 @@ for name, mine in ours.groupby("system", sort=False):
         "worst coefficient (%)": significant(100 * mine.max_coefficient_error.median()),
         "detector (px)": significant(np.median(off)),
         "track (px)": significant(np.median([film.pixel_error for film in shots])),
-        "seconds": shots[0].seconds + mine.seconds.iloc[0],
+        "seconds": np.median([film.seconds for film in shots]) + mine.seconds.median(),
     })  # fmt: skip
 
 # %%
@@ -400,7 +402,7 @@ print(len(rows), "terms, stored as table_S2")
 #
 # A law is more than its coefficients: let it run. We start each discovered law at the first point
 # of its curve and the truth at its initial condition. Where a motion is chaotic a small error grows
-# exponentially; a forecast counts as good until the distance exceeds a tenth of the motion's
+# exponentially (NoseHoover and Tsucs2 are not chaotic from the paper's starts, see [notebook 02](02_videos_and_tracking.ipynb)); a forecast counts as good until the distance exceeds a tenth of the motion's
 # standard deviation (of the coordinate that moves most). A law should also hold where nobody filmed: so both start at other points, too, off the first one by a fifth of
 # the standard deviation in each coordinate.
 
@@ -485,9 +487,9 @@ save_figure("fig_2", fig, caption=caption, numbers=numbers)
 # * Nineteen of twenty coefficients lie within two standard errors, as they should; by system fewer or more, for the errors of a
 #   detector are not all told by the tracks.
 #   <!-- by: 0.9 < np.mean(np.abs(every) < 2) < 0.98; min(within.values()) < 0.9 < 0.99 < max(within.values()) -->
-# * On such tracks spline-ADO and Model-A err up to five times as much as Gauss-Newton in the median. PySINDy and E-SINDy err by per
+# * On such tracks spline-ADO errs up to three times, Model-A up to five times as much as Gauss-Newton in the median. PySINDy and E-SINDy err by per
 #   cents, which is what their finite differences cost. What sets the optimisers far apart is noise.
-#   <!-- by: middle[["spline-ADO", "Model-A"]].max() < 5 * middle["Gauss-Newton"]; middle["PySINDy"] > 5 * middle["spline-ADO"]; 06: noisy["Gauss-Newton"] > noisy.drop("Gauss-Newton").max() + 0.2 -->
+#   <!-- by: middle["spline-ADO"] < 3 * middle["Gauss-Newton"] > middle["Model-A"] / 5; middle["PySINDy"] > 5 * middle["spline-ADO"]; 06: noisy["Gauss-Newton"] > noisy.drop("Gauss-Newton").max() + 0.2 -->
 #
 # **What the paper says and what we found.**
 #
@@ -495,8 +497,8 @@ save_figure("fig_2", fig, caption=caption, numbers=numbers)
 #   spline-ADO is below the paper's error in every system, with a false term in some trials, of Tsucs2 in most. Trials differ in
 #   nothing but their scenes, so that what makes them differ is the tracker.
 #   <!-- by: (ado["l2 (e-2)"] < ado["paper: l2 (e-2)"]).all(); figure table_1 -->
-# * PySINDy's 824 % (NoseHoover) and 856 % (WangSun) are coefficients ten times too large
-#   throughout: a time step wrong by that factor. With the right step the medians are below 20 % here.
+# * PySINDy's 824 % (NoseHoover) and 856 % (WangSun) are coefficients about ten times too large,
+#   nearly all of them: a time step wrong by that factor. With the right step the medians are below 20 % here.
 #   <!-- by: 10b: 9 < medians[name] < 11; (plain[["NoseHoover", "WangSun"]] < 20).all(); figure table_1 -->
 # * "Nine datasets" are seven, and the paper's frame of reference has to be guessed from its own
 #   ground truths.

@@ -103,7 +103,7 @@ path_error = {
 }
 
 # %% [markdown]
-# To the tracks, or to the path $\mathbf x$, we do one of three things, in the paper's words:
+# To the tracks, or to the path $\mathbf x$, we do one of three things, of the paper's kinds; what a level is relative to, it does not say:
 #
 # * **noise** of level $p$: $\tilde x_i = x_i + p\,\sigma_i\,\varepsilon$ with
 #   $\varepsilon\sim N(0,1)$, where $\sigma_i$ is the standard deviation of coordinate $i$;
@@ -374,8 +374,8 @@ for figure_id, name in others.items():
     other(figure_id, name)
 
 # %% [markdown]
-# *From top to bottom: Fig. S5, Lorenz; S6, NoseHoover; S7, WangSun; S8, SprottE; S9, RayleighBenard; S10, Tsucs2, the
-# hardest of the seven; below is why.*
+# *From top to bottom: Fig. S5, Lorenz; S6, NoseHoover; S7, WangSun; S8, SprottE, of which with 20 % noise no cameras can be learned, and
+# no law found: an error of 100 %; S9, RayleighBenard; S10, Tsucs2, of which noise hides a term; below is why.*
 #
 # ## The ablation (Table 2)
 #
@@ -418,9 +418,15 @@ assert held.mean() >= 0.8 or not full
 printed_20 = [ABLATION["noise", 20, method] for method in ("Ours", "Model-A")]
 assert [row.false_positives for row in printed_20] == [1, 1]
 assert [row.precision for row in printed_20] == [1, 0.8]
+if full:
+    assert middle_of["Model-A"] < middle_of.drop("Model-A").min()  # the last: a fifth in fibers
+    assert (right.loc[kind, "Model-A"] > right.loc[kind, "spline-ADO"] - 0.1).all()
+    assert noisy["E-SINDy"] > noisy["spline-ADO"]
 
 # %% [markdown]
-# Our solver is taken apart in the same way, with errors that are not white, in [notebook 11](11_scoreboard.ipynb#our-solver-taken-apart).
+# Under noise the core pays. With gaps it hardly does: with a fifth of SprottF in fibers Model-A has the smallest median of the three, and
+# over all systems it finds about as many exact laws as spline-ADO, clean and with gaps (first table of counts); with 10 % noise E-SINDy finds
+# more. Our solver is taken apart in the same way, with errors that are not white, in [notebook 11](11_scoreboard.ipynb#our-solver-taken-apart).
 #
 # ## The second protocol: noise and gaps in the path
 #
@@ -637,7 +643,7 @@ save_figure("study_verdicts_figure", fig, caption=caption, numbers=verdicts)
 mine = paths  # each trial once
 counts = mine.verdict.value_counts()
 rows = [
-    {"law": law} | {s: f"{counts.get(f'{law}, {s}', 0) / len(mine):.0%}" for s in ("ok", "suspect")}
+    {"law": law} | {s: f"{counts.get(f'{law}, {s}', 0)} of {len(mine)}" for s in ("ok", "suspect")}
     for law in ("exact", "wrong")
 ]
 caption = f"Law and status in {len(mine)} trials of Gauss-Newton under the second protocol."
@@ -645,13 +651,15 @@ silent = mine[mine.verdict == "wrong, ok"]
 doubted = (mine[mine.exact].status == "suspect").mean()
 print("wrong laws without a warning:", silent.system.value_counts().to_dict())
 print(f"{doubted:.0%} of the exact laws are doubted")
-assert doubted < 0.2 or not full
+if full:
+    assert doubted < 0.2
+    assert 20 * len(silent) < len(mine)
+    assert 0.3 < len(silent) / (~mine.exact).sum() < 0.7
 save_table("study_verdicts", rows, caption=caption)
 
 # %% [markdown]
-# A wrong law without a warning is one that fits the data to within their noise, as the law of
-# Tsucs2 without its weakest term does. Its fit gives nothing away; a longer record or less noise
-# would.
+# Of the few wrong laws about half come without a warning. Such a law fits the data to within their noise: that of Tsucs2 without
+# its weakest term, or one with a small constant too many. Its fit gives nothing away; a longer record or less noise would.
 #
 # ## Tracking or regression?
 #
@@ -704,11 +712,11 @@ for row in rows:
 # * Gaps in exact samples cost SprottF next to nothing.
 #   <!-- by: gaps.exact.all(); (gaps.l2 < 1e-4).all() -->
 # * The limit is information, and the Cramér-Rao bound knows it in advance: Tsucs2 has one term that
-#   noise of 10 % buries.
+#   noise of little more than 10 % buries.
 #   <!-- by: limit["Tsucs2"] < 0.15; min(limit, key=limit.get) == "Tsucs2" -->
 # * Error bars hold under noise for laws with the right terms. A law that fits as well as the truth
-#   carries no warning, even if it is wrong.
-#   <!-- by: row["within 2 (%)"] > 80; figure study_verdicts -->
+#   carries no warning, even if it is wrong: fewer than one law in twenty, but about half of those that are wrong.
+#   <!-- by: row["within 2 (%)"] > 80; 20 * len(silent) < len(mine); 0.3 < len(silent) / (~mine.exact).sum() < 0.7; figure study_verdicts -->
 # * Videos and cameras add nothing to these errors that could be seen, if tracks are known to a fraction of a pixel.
 #   <!-- by: row["l2, videos (e-2)"] < 0.05 * videos; abs(videos - truth) <= 0.2 -->
 #
@@ -719,8 +727,9 @@ for row in rows:
 #   paper's own optimiser, with errors like the paper's or smaller.
 #   <!-- by: reached.median() < 1.2 * known_l2; held.mean() >= 0.8 -->
 # * *"the performance of the ablated model deteriorates in all considered cases"*: the worst of its trials is worse than both
-#   optimisers' in all six conditions, and under noise so is the median.
-#   <!-- by: worst_of["Model-A"] > worst_of[method]; middle_of["Model-A"] > 2 * middle_of[method] -->
+#   optimisers' in all six conditions, and under noise so is the median. Not so with gaps: its median with a fifth in fibers is the
+#   smallest, and over all systems it finds about as many exact laws as spline-ADO.
+#   <!-- by: worst_of["Model-A"] > worst_of[method]; middle_of["Model-A"] > 2 * middle_of[method]; middle_of["Model-A"] < middle_of.drop("Model-A").min(); (right.loc[kind, "Model-A"] > right.loc[kind, "spline-ADO"] - 0.1).all() -->
 # * Table 2 contradicts itself at 20 % noise: one false positive with a precision of 100 % for one
 #   method, one with 80 % for the other.
 #   <!-- by: [row.false_positives for row in printed_20] == [1, 1]; [row.precision for row in printed_20] == [1, 0.8]; figure table_2 -->

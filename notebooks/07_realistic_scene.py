@@ -16,8 +16,8 @@
 # %% [markdown]
 # # The realistic scene: a tumbling target behind trees
 #
-# In this notebook, we present the hardest videos of the paper: an irregular target tumbles, comes
-# nearer and recedes, the images are noisy, and a tree stands in the way of every camera. From them
+# In this notebook, we present the hardest videos of the paper: an irregular target tumbles and
+# changes in size, the images are noisy, and a tree stands in the way, here of every camera. From them
 # the equations are discovered as before, by the same calls.
 #
 # **What you will see**
@@ -362,8 +362,7 @@ assert all(trial.score.exact for trial in runs)
 assert all(trial.score.l2 <= 1e-2 for trial in runs)
 
 # %% [markdown]
-# Where a trial is *suspect*, the law is right all the same: the few periods of the record leave a second
-# law possible, with a term more, and the warning says so.
+# All trials are exact. Where one is *suspect* all the same, a warning under it says which other law fits as well.
 
 # %% [markdown]
 # ## What we learned
@@ -382,8 +381,8 @@ assert all(trial.score.l2 <= 1e-2 for trial in runs)
 # * The paper shows that the equations can be found under these conditions and prints neither them nor
 #   their errors, so there is no number to compare with. Here they are found in every trial.
 #   <!-- by: all(trial.score.exact for trial in runs); docs/paper.md -->
-# * It says that the law is found "from sparse observation points". So it is here; what makes it possible
-#   is that gaps are no obstacle for a law, as long as it can be carried across them.
+# * It says that the path is reconstructed "from sparse observation points", and its law found. So it is here; what makes
+#   it possible is that gaps are no obstacle for a law, as long as it can be carried across them.
 #   <!-- by: figure scene_equations; (error < 0.01 * first.x.std(axis=0)).all() -->
 
 # %% [markdown]

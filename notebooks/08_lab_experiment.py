@@ -17,8 +17,8 @@
 # # The lab experiment: a ball on a table
 #
 # In this notebook, we present the one experiment of the paper with real cameras: a ball rolls over a
-# table, three cameras film it, and its path is reconstructed with an error of 8.87 mm. We ask where the
-# millimetres come from, and take them away.
+# table, three cameras film it, and one point of its path is found with an error of 8.87 mm. We ask where
+# the millimetres come from, and take them away.
 #
 # **What you will see**
 #

@@ -34,7 +34,7 @@
 # **What you need**: the objective of [notebook 04](04_spline_ado.ipynb), the cameras of
 # [notebook 08](08_lab_experiment.ipynb).
 #
-# **Covers** nothing in the paper: it is what the paper leaves to do.
+# **Covers** nothing in the paper, whose laws are all of first order.
 
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
@@ -96,8 +96,8 @@ print(law.text())
 # %% [markdown]
 # ## Three films
 #
-# Three perspective cameras film the ball from two metres, before other grounds. The files are those of a telephone (.mp4):
-# their codec moves the edges of a small target.
+# Three perspective cameras film the ball from two metres, before other grounds. The files are compressed (.mp4),
+# which moves the edges of a small target.
 
 # %%
 bearings = np.radians([10.0, 130.0, 250.0])
@@ -117,8 +117,8 @@ for path, camera in zip(paths, rig.cameras, strict=True):
     write_video(path, read_video(drawn), fps, codec="mp4v")
 
 # %% [markdown]
-# One camera is calibrated, of the others position and normal are known; everything else is learned, when each
-# film began among it. The word `order=2` asks for a law of motion; without it, one is looked for where a law of
+# One camera is calibrated, of the others position and normal are known; everything else is learned, also when
+# each film began. The word `order=2` asks for a law of motion; without it, one is looked for where a law of
 # first order is doubtful.
 
 # %%
@@ -137,7 +137,8 @@ assert (off[searched] < 5 * errors[searched]).all()
 
 # %% [markdown]
 # What a class wants to know is said with error bars, too, carried through from those of the coefficients: stiffness,
-# damping and period of small swings about the place of rest, and whether the energy falls, as it should.
+# damping and period of small swings about the place of rest, and whether the energy falls, as it should: by more than the
+# largest kinetic energy here, as most of it is that of the spring at first.
 
 # %%
 springs = found.physics()
@@ -166,7 +167,7 @@ shown = [[image for i, image in enumerate(read_video(path)) if i in moments] for
 lines = found.equations().splitlines()
 pictures = plots.draw_tour(shown, moments, curves, seen.fitted, lines)
 caption = "Three films of a ball on a spring, and over them the curve that obeys the law found from them."
-save_animation("newton_films", pictures, caption=caption, numbers={"frame": moments})
+save_animation("newton_films", pictures, caption=caption, numbers={"frame": moments, "equations": lines})
 
 # %% [markdown]
 # ![Three films of a ball on a spring, with the law over them](../figures/newton_films.gif)
@@ -325,7 +326,8 @@ assert swung.status == "ok"
 assert abs(swung.coefficients[row, 1] + 9.81) < 5 * swung.standard_errors[row, 1]
 
 # %% [markdown]
-# Small swings of a pendulum are those of a spring with the constant $g/L$: here of $g$ itself, as $L$ is 1 m.
+# Small swings of a pendulum are those of a spring with the constant $g/L$: here of $g$ itself, as $L$ is 1 m. (A natural
+# frequency is an angular one, in radians a second.)
 
 # %%
 print(swung.physics())
@@ -450,7 +452,7 @@ rows = [
     }
     for motion, (told, true) in laws.items()
 ]  # fmt: skip
-save_table("newton_laws", rows, caption="Laws of second order from positions alone.")
+save_table("newton_laws", rows, caption="Laws of second order from positions alone; true terms count those of x' = v as well.")
 
 # %% [markdown]
 # ## What we learned
@@ -468,7 +470,7 @@ save_table("newton_laws", rows, caption="Laws of second order from positions alo
 #   <!-- by: (fallen.system.support == flight.support).all(); abs(g.value - 9.81) < 4 * g.error; once.status == "suspect" -->
 # * A drag that is no polynomial and the same in all directions is one term, a vector.
 #   <!-- by: abs(drag_2.value - 0.05) < 4 * drag_2.error; term_errors(slowed.system, fast) == ([], []) -->
-# * Kicks of the motion are no errors of the measurement: they are found, counted, and stay out of the law.
+# * Kicks of the motion are no errors of the measurement: they are found and measured, and stay out of the law.
 #   <!-- by: set(names) == {"x", "vx", "x^3"}; abs(kicked.model_error[1] / gust - 1) < 0.4 -->
 # * A law that is no polynomial is found when its terms are among the candidates, and then holds at other amplitudes, too.
 #   <!-- by: (swung.system.support == pendulum.support).all(); miss < 0.1 -->

@@ -29,7 +29,8 @@
 #
 # **What you need**: Newton's second law.
 #
-# **Covers** nothing in the paper, which films with three cameras: real film is what it leaves to do.
+# **Covers** nothing in the paper, which films with three cameras and leaves real film to future work, but for a ball that
+# rolls ([notebook 08](08_lab_experiment.ipynb)). The films of this page are drawn.
 
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
@@ -279,8 +280,8 @@ save_figure("phone_forecast", fig, caption=caption, numbers=numbers)
 #
 # **What the paper says and what we found.**
 #
-# * The paper's discussion hopes for real film, with its three cameras. For a motion in a plane one is enough, if
-#   something of known length is in the picture.
+# * The paper's conclusion leaves laws from real film to future work, with its three cameras. For a motion in a plane one
+#   is enough, if something of known length is in the picture.
 #   <!-- by: abs(flight.g.value - g) < 4 * flight.g.error; tests/test_plane.py::test_the_toss -->
 
 # %% [markdown]

@@ -7,14 +7,14 @@ collocation times (Eq. 9b), STRidge with an adaptive hard threshold for the coef
 (P, surviving coefficients, offset), an affine elimination of the offset (Eq. 10), and a small
 value below which coefficients are cut at the end.
 
-Four things the paper leaves open and what is done here:
+Three things that the paper leaves open, one that it does otherwise (the third), and what is done here:
 
 * The curve is ``G P + offset`` in the data loss and ``G P`` in the library. With the offset in
   both, as one reading of the text has it, it changes nothing, for B-splines sum to one.
 * Data are standardised (coordinates and time divided by their scale, undone at the end): one
   learning rate and one physics weight then serve all systems. The offset starts at the mean.
-* The law is asked for where samples are, or in the next knot span: within a gap the first curve is
-  a guess, to which physics would fit the law.
+* The law is asked for where samples are, or in the next knot span, and not at all times: within a
+  gap the first curve is a guess, to which physics would fit the law.
 * Hyperparameters: see `spline_ado`. "PiSL" there is the public code of the same model by the
   same group (F. Sun, Y. Liu, H. Sun, "Physics-informed Spline Learning for Nonlinear Dynamics
   Discovery", IJCAI 2021), in its Lorenz example.
