@@ -7,7 +7,7 @@ collocation times (Eq. 9b), STRidge with an adaptive hard threshold for the coef
 (P, surviving coefficients, offset), an affine elimination of the offset (Eq. 10), and a small
 value below which coefficients are cut at the end.
 
-Three things that the paper leaves open, one that it does otherwise (the third), and what is done here:
+What the paper leaves open or, as the third, does otherwise, and what is done here:
 
 * The curve is ``G P + offset`` in the data loss and ``G P`` in the library. With the offset in
   both, as one reading of the text has it, it changes nothing, for B-splines sum to one.
