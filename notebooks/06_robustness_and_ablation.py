@@ -658,8 +658,8 @@ if full:
 save_table("study_verdicts", rows, caption=caption)
 
 # %% [markdown]
-# Of the few wrong laws about half come without a warning. Such a law fits the data to within their noise: that of Tsucs2 without
-# its weakest term, or one with a small constant too many. Its fit gives nothing away; a longer record or less noise would.
+# Of the few wrong laws about half come without a warning. Such a law fits the data to within their noise, as that of Tsucs2 without
+# its weakest term does. Its fit gives nothing away; a longer record or less noise would.
 #
 # ## Tracking or regression?
 #

@@ -440,7 +440,7 @@ def diagnose(
     """
     wider = widened(problem, fit)
     # Without errors that the splines could tell from their own: what is clean cannot be cleaner.
-    clean = bool((residual_noise(fit) <= CLEANEST).all())
+    clean = bool((effective_noise(fit) <= CLEANEST).all())
     remedy = "cleaner samples or a longer trajectory"
     if clean:
         remedy = "a longer trajectory, denser samples or other starts"
