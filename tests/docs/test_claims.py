@@ -150,11 +150,11 @@ def both_beat_pysindy():
     return all(error[s, m] < error[s, "PySINDy"] for s in systems for m in OPTIMISERS)
 
 
-def worse_without_the_law():
-    """Whether the worst trial of the ablated model is worse than both in every condition."""
-    most = {(r["condition"], r["rate (%)"], r["method"]): r["most"] for r in table("table_2")}
-    cases = {key[:2] for key in most}
-    return all(most[*c, "Model-A"] > most[*c, m] for c in cases for m in OPTIMISERS)
+def nearer_without_the_law():
+    """Whether in some condition the ablated model is nearer than both, in the median."""
+    off = {(r["condition"], r["rate (%)"], r["method"]): r["l2 (e-2)"] for r in table("table_2")}
+    cases = {key[:2] for key in off}
+    return any(all(off[*c, "Model-A"] < off[*c, m] for m in OPTIMISERS) for c in cases)
 
 
 def holds(condition, level, method="spline-ADO"):
@@ -172,8 +172,8 @@ MEASURED = [
     ('"outperforms PySINDy on each dataset"', "same", both_beat_pysindy),
     ("Fig. 3 SprottF, noise and gaps", "stronger", lambda: both_are_nearer("table_2")),
     (
-        '"performance of the ablated model deteriorates in all considered cases"', "same",
-        worse_without_the_law,
+        '"performance of the ablated model deteriorates in all considered cases"', "weaker",
+        nearer_without_the_law,
     ),
     (
         '"up to a 20% noise interference, our method almost accurately identifies all correct '
