@@ -552,8 +552,6 @@ def weakest(name):
 rows = [weakest(name) for name in systems]
 caption = "Noise beyond which the weakest term of a system cannot be told from zero."
 save_table("study_limits", rows, caption=caption, tolerance={"lost from (%)": 0.2})
-
-# %%
 limit = {row["system"]: row["lost from (%)"] / 100 for row in rows}
 if full:
     assert min(limit, key=limit.get) == "Tsucs2"
