@@ -123,18 +123,16 @@ def first_law(problem: Problem, history: History, tolerated: float | None = None
     degrees, implicit = problem.exponents.sum(axis=1), problem.form.implicit
     # Terms of denominators come last: a factor above and below the line changes nothing.
     stages = [~implicit & (degrees <= 2), ~implicit, np.ones_like(implicit)]
-    found: list[Fit] = []
     for rows in {rows.tobytes(): rows for rows in stages}.values():  # of those alike, one
         whole = unpruned(tolerant, rows)
         history.add("all terms", whole)
         fit = cheapest(tolerant, whole, [(problem.origin, np.zeros(problem.d, dtype=bool))])
         for weight in WEIGHTS:
             fit = select(tolerant, fit, weight, "subset search", history)
-        found.append(framed(tolerant, fit, history))
-        fits = (residual_noise(found[-1]) <= CONSISTENT * tolerant.noise).all()
-        if history.over or (fits and not leaves_something_over(tolerant, whole)):
+        fit = framed(tolerant, fit, history)
+        if not leaves_something_over(tolerant, whole) or history.over:
             break
-    return min(found, key=lambda fit: (fit.status is not Status.CONVERGED, fit.criterion))
+    return fit
 
 
 def select(problem: Problem, start: Fit, weight: float, stage: str, history: History) -> Fit:
