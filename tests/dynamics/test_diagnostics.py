@@ -220,9 +220,9 @@ def test_a_cubic_for_another_function_is_doubted_and_a_true_law_is_not(pull, sta
     assert any((WORDS if words is None else words) in w for w in told) == (words is not None)
 
 
-@pytest.mark.parametrize(("number", "status"), [(4, "suspect"), (13, "suspect"), (12, "ok")])
+@pytest.mark.parametrize(("number", "status"), [*((n, "suspect") for n in (4, 8, 13)), (12, "ok")])
 def test_a_way_to_rest_on_a_line_is_doubted_where_higher_terms_explain_what_is_left(number, status):
-    data = OdeContest(number).data()  # an exponential, a sine; and a cubic
+    data = OdeContest(number).data()  # an exponential, a cubic with a small error, a sine; a cubic
     assert discover(data.t, data.x).status == status
 
 
