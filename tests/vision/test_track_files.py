@@ -174,7 +174,7 @@ def test_times_are_kept_and_trackers_world_is_not_taken_for_pixels(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "must hold rows of numbers"),
+        ("u,v\n1,2,\n1,0,5\n", "must have 2 cells in a row, got 3 in row 1"),
         ("u,v\n", "must hold rows of numbers"),
         ("a,b\n1,2\n", "must have columns u and v, got a, b"),
         ("1,2,3,4\n", "must have a header, or columns u and v"),

@@ -156,6 +156,9 @@ def _tracks(
             doubts = (f"{name}: its positions are taken for pixels: it does not say what they are",)
     names = [names[0] or "index", *names[1:]] if names else names
     width = len(names) or max(map(len, rows))
+    for k, row in enumerate(rows):
+        if any(cell.strip() for cell in row[width:]):  # of which column each is, nobody knows
+            raise ValueError(f"must have {width} cells in a row, got {len(row)} in row {k}")
     rows = [[*row, *[""] * (width - len(row))] for row in rows]
     who, chosen = _column(names, _WORDS["target"]), ""
     if who is not None:
