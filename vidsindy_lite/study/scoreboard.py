@@ -239,7 +239,7 @@ class OdeContest:
     @property
     def condition(self) -> str:
         """The same for all that belong to one row of a table."""
-        words = ["exact" if self.tight else "stored"]
+        words = ["tight" if self.tight else "stored"]
         words += [f"noise {100 * self.noise:g} %"] if self.noise else []
         words += [f"{100 * self.dropped:g} % dropped"] if self.dropped else []
         return ", ".join(words)
