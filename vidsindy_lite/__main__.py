@@ -144,8 +144,8 @@ def _discover(options: argparse.Namespace) -> int:
     for one in options.videos:
         if Path(one).suffix.lower() in TABLES:
             raise ValueError(f"videos: must be films, tracks come after --tracks, got '{one}'")
-    check_folder_is_free(options.out)
     given = options.tracks or options.videos
+    check_folder_is_free(options.out, [*given, *filter(None, [options.rig])])
     alone = options.rig is None and len(given) == 1
     if options.rig is None and not alone and (options.tracks or len(given) == 2):
         raise ValueError("rig: must be given for several tracks or two videos, got none")

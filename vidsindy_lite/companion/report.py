@@ -100,13 +100,16 @@ def _holds(path: Path, *marks: str) -> bool:
 # --------------------------------------------------------------------------------------- the report
 
 
-def check_folder_is_free(folder: str | Path) -> Path:
+def check_folder_is_free(folder: str | Path, given: Sequence[str | Path] = ()) -> Path:
     """That a report may be written there: none of its files is, or those of an earlier report.
+
+    Of these none may be given, to be read.
 
     Raises
     ------
     ValueError
-        If files of these names are none of a report, it is no folder, or cannot be written to.
+        If files of these names are none of a report, or given, it is no folder, or cannot be
+        written to.
     """
     folder = check_path("out", folder)
     there = next(one for one in (folder, *folder.absolute().parents) if one.exists())
@@ -120,6 +123,9 @@ def check_folder_is_free(folder: str | Path) -> Path:
             f"out: must hold no files of the names {', '.join(FILES)} but of an earlier report, "
             f"got '{folder}' with {', '.join(strange)}"
         )
+    own = {(folder / name).resolve() for name in FILES}
+    if read := next((path for path in given if Path(path).resolve() in own), None):
+        raise ValueError(f"out: must be another folder than that of what is read, got '{read}'")
     return folder
 
 

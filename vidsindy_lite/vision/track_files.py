@@ -470,16 +470,17 @@ def _track(
                 f"{name}: its times are {step:.4g} apart: if these are milliseconds, "
                 f"call the column {clock[0]}_ms",
             )
-        t = _unrounded(t)
-    elif frames is not None:
-        if not _counts(frames):
-            raise ValueError(
-                "must have increasing whole numbers of frames within ten million, got "
-                + ", ".join(f"{frame:.10g}" for frame in frames[:4])
-            )
-        start, seen = int(frames[0]), pixels
-        pixels = np.full((int(frames[-1]) - start + 1, 2), np.nan)
-        pixels[(frames - start).astype(int)] = seen
+        t, frames = _unrounded(t)
+    elif frames is not None and not _counts(frames):
+        raise ValueError(
+            "must have increasing whole numbers of frames within ten million, got "
+            + ", ".join(f"{frame:.10g}" for frame in frames[:4])
+        )
+    if frames is not None:
+        start, seen, rows = int(frames[0]), pixels, (frames - frames[0]).astype(int)
+        pixels = np.full((rows[-1] + 1, 2), np.nan)
+        pixels[rows] = seen
+        t = None if t is None else np.interp(np.arange(len(pixels)), rows, t)
     return TrackFile(name, pixels, t, doubts, start, upwards)
 
 
@@ -496,16 +497,19 @@ def _seen(columns: Mapping[str, Floats]) -> Bools:
     return seen
 
 
-def _unrounded(t: Floats) -> Floats:
-    """Times as they were before they were rounded for a file, if an even clock fits them all."""
+def _unrounded(t: Floats) -> tuple[Floats, Floats | None]:
+    """Times as they were before they were rounded for a file, and the frames that they count.
+
+    If an even clock fits them all; else as they are, and none.
+    """
     if len(t) < 3:
-        return t
+        return t, None
     last_digit = 10.0 ** -max(len(f"{value:.9f}".rstrip("0").partition(".")[2]) for value in t)
     steps = np.diff(t)
     counted = np.concatenate(([0.0], np.cumsum(np.rint(steps / np.median(steps)))))
     even = np.polynomial.Polynomial.fit(counted, t, 1)(counted)
-    fits = (np.diff(counted) > 0).all() and np.abs(even - t).max() < last_digit
-    return even if fits else t
+    fits = _counts(counted) and np.abs(even - t).max() < last_digit
+    return (even, counted) if fits else (t, None)
 
 
 def _counts(frames: Floats) -> bool:
