@@ -143,7 +143,7 @@ def test_a_refusal_has_one_line_and_a_picture(tracked, capsys):
     ("options", "message"),
     [
         ([], "videos: give either one video per camera, or --tracks"),
-        (["--tracks", "a.csv", "b.csv", "c.csv"], "fps: must be given, or t, as a.csv states no"),
+        (["--tracks", "a.csv", "b.csv", "c.csv"], "fps: must be given, or times, as a.csv states"),
         (["--tracks", "a.csv", "none.csv"], "tracks: no such file, got 'none.csv'"),
         (["--tracks", "1.csv", "1.csv", "1.csv", "--fps", "9"], "tracks: must have two frames or"),
         (["--tracks", "a.csv", "--individual", "mouse"], "tracks: must name the individual"),

@@ -542,11 +542,11 @@ def _off_neighbours(rows: Ints, track: Floats) -> Floats:
 
 
 def check_found(
-    tracks: Sequence[Floats], names: Sequence[str], targets: int, told: Sequence[Sequence[str]]
+    tracks: Sequence[Floats], names: Sequence[str], targets: int, told: Sequence[Sequence[str]] = ()
 ) -> None:
     """That each video shows its targets: all are tracked first, so that all can be looked at.
 
-    What is told of each track says why it does not.
+    What is told of each film says why it does not.
 
     Raises
     ------
@@ -556,9 +556,10 @@ def check_found(
     wanted = "one moving target" if targets == 1 else f"{targets} moving targets"
     still = ("what moves by less than a tenth of its own width is taken for background; a box "
              "around the one target in one frame shows it: --hint, pick, vl.Hint")  # fmt: skip
-    for pixels, name, causes in zip(tracks, names, told, strict=True):
+    for i, (pixels, name) in enumerate(zip(tracks, names, strict=True)):
         if (found := int(np.isfinite(pixels).any(axis=0).sum()) // 2) < targets:
-            got = f"got {found or 'none'} in any frame: {'; '.join((*causes, still))}"
+            why = f": {'; '.join((*told[i], still))}" if told else ""
+            got = f"got {found or 'none'} in any frame{why}"
             raise Refused(f"paths: {name} must show {wanted}, {got}", "track", tracks)
 
 
@@ -887,7 +888,7 @@ def times_of(
     if fps is None:
         if len(stated) < len(read):
             name = next(track.name for track in read if track.t is None)
-            raise ValueError(f"fps: must be given, or t, as {name} states no times")
+            raise ValueError(f"fps: must be given, or times, as {name} states none")
         return [times for _, times in stated], []
     given = check_positive("fps", fps)
     rates = [(name, 1 / np.median(np.diff(times))) for name, times in stated if len(times) > 1]

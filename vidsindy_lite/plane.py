@@ -204,7 +204,7 @@ def discover_from_video(
     t, pixels, first, warnings = np.asarray(track.t), track.pixels, track.start, track.warnings
     if frames is not None:
         pixels = _between(frames, pixels, first)
-    pipeline.check_found([pixels], [name], 1, [warnings])
+    pipeline.check_found([pixels], [name], 1, () if table else [warnings])
     pixels, left_out = pipeline.without_wild(pixels, name)
     zero, clock = np.zeros(1), np.arange(len(t), dtype=float)
 

@@ -139,10 +139,12 @@ def _tracks(
     name: str, header: list[list[str]], rows: list[list[str]], individual: str | None
 ) -> list[TrackFile]:
     """The tracks in the cells of a file."""
-    heads = [[_plain(cell) for cell in row] for row in header] or [[]]
-    names = heads[-1]
     doubts: tuple[str, ...] = ()
     units = next((row for row in header if any(cell.strip().startswith("(") for cell in row)), None)
+    named = [i for i, row in enumerate(header) if _names_pixels(row)]
+    header = header[: named[-1] + 1] if named else header  # without units below
+    heads = [[_plain(cell) for cell in row] for row in header] or [[]]
+    names = heads[-1]
     if heads[0][:1] == ["scorer"]:
         names = _of_poses(header, names)
     if "position_x" in heads[0]:  # of TrackMate, above other names of them
@@ -228,7 +230,10 @@ def _of_table(text: str) -> tuple[list[list[str]], list[list[str]]]:
     cells = _cells(text)
     poses = bool(cells) and cells[0][0].strip().lower() == "scorer"
     begins = [row[0].strip().lower() == "coords" if poses else _is_of_numbers(row) for row in cells]
-    start = begins.index(True) + poses if True in begins else 1 if poses else len(cells)
+    other = (i for i, row in enumerate(cells) if not begins[i] and _names_pixels(row))
+    above = 0 if poses else max(other, default=0)  # a title may hold numbers
+    first = (i + poses for i, begun in enumerate(begins) if begun and i >= above)
+    start = next(first, 1 if poses else len(cells))
     header, rows = cells[:start], cells[start:]
     if poses:  # names of folders may stand before those of images
         more = next((i for i, cell in enumerate(header[0][1:]) if cell.strip()), 0)
@@ -275,6 +280,13 @@ def _of_kinovea(text: str) -> tuple[list[list[str]], list[list[str]]]:
 def _plain(cell: str) -> str:
     """The name of a column without its unit, if that is pixels."""
     return re.sub(r"\s*[(\[](px|pixels?)[)\]]$", "", cell.strip().lower())
+
+
+def _names_pixels(row: Sequence[str]) -> bool:
+    """Whether a line names two columns of pixels, as of one of several cameras or targets."""
+    names = {*map(_plain, row)}
+    known = (one.fullmatch(name) for one in _SERIES for name in names)
+    return any({*pair} <= names for pair in _WORDS["pixels"]) or any(known)
 
 
 def _is_of_numbers(row: Sequence[str]) -> bool:
@@ -472,9 +484,11 @@ def _track(
             )
         t, frames = _unrounded(t)
     elif frames is not None and not _counts(frames):
+        wrong = (frames % 1 != 0) | ~(np.diff(frames, prepend=-np.inf) > 0)
+        row = int(wrong.argmax()) if wrong.any() else len(frames) - 1
         raise ValueError(
             "must have increasing whole numbers of frames within ten million, got "
-            + ", ".join(f"{frame:.10g}" for frame in frames[:4])
+            f"{frames[row]:.10g} in row {row}"
         )
     if frames is not None:
         start, seen, rows = int(frames[0]), pixels, (frames - frames[0]).astype(int)
@@ -520,7 +534,7 @@ def _counts(frames: Floats) -> bool:
 
 def _is_of_tracker(header: list[list[str]]) -> bool:
     """Whether the name of a mass stands above the columns."""
-    if len(header) < 2:
+    if len(header) < 2 or len(header[-2]) not in (1, len(header[-1])):  # as of a title
         return False
     masses = [cell.strip() for cell in header[-2] if cell.strip()]
     if len(masses) > 1:
