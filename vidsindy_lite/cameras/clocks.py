@@ -94,9 +94,8 @@ def align(
     Returns
     -------
     tuple of ndarray, shape (n_0, 2)
-        NaN where a video has not begun, has ended, or does not show the target in the frames before
-        and after, or these are more than one dropped frame apart. At whole frames these are the
-        tracks themselves.
+        NaN where a video has not begun, has ended, or of the frames around two in a row do not show
+        the target or were dropped. At whole frames these are the tracks themselves.
 
     Raises
     ------
@@ -165,18 +164,19 @@ class Curve:
     def at(self, frames: Floats) -> Floats:
         """Pixels, (..., 2).
 
-        NaN outside, and unless the target is seen in the frames before and after, and these are
+        NaN outside, at frames that do not show the target, and between two that do and are not
         close to each other.
         """
-        within = np.clip(frames, self.clock[0], self.clock[-1])
-        low = np.searchsorted(self.clock, within, "right") - 1
-        high = np.searchsorted(self.clock, within, "left")
-        values, between = self.track[low], low != high
+        seen, places = self._seen
+        within = np.clip(frames, seen[0], seen[-1])
+        low, high = np.searchsorted(seen, within, "right") - 1, np.searchsorted(seen, within)
+        values, between = places[low], low != high
         if between.any():
             values[between] = self._spline(within[between])
-        # Frames between two that it is interpolated from: one of them may be dropped.
-        near = self.clock[high] - self.clock[low] <= 2.5
-        values[~((frames == within) & self.shown[low] & self.shown[high] & near)] = np.nan
+        row = np.searchsorted(self.clock, within)
+        hidden = (self.clock[row] == within) & ~self.shown[row]
+        # Frames between two that it is interpolated from: one of them may be dropped, or hidden.
+        values[(frames != within) | hidden | (seen[high] - seen[low] > 2.5)] = np.nan
         return values
 
     def averaged(self, step: float) -> Curve:
