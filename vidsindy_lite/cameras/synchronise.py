@@ -18,8 +18,8 @@ A motion that repeats itself fits at several lags, one that hardly moves at all 
 result says so.
 
 The errors of lags are those of least squares, but for residuals that depend on their neighbours,
-and for slopes that are noise: with a share p of motion in the squares of the slopes they are 1 / p
-times as large.
+and for slopes that are noise: with a share p of motion in the squares of the slopes, beyond what
+cameras that are known to their errors make up for, they are 1 / p times as large.
 
 **Mistakes** are one of a few, and what is right is known at once: tracks in another order than the
 cameras, a mirrored view, v counted upwards, a video of another frame rate than stated, dropped
@@ -144,6 +144,7 @@ def shares(fit: Adjustment) -> Floats:
     between two frames that are two apart.
     """
     slopes = fit.reduced.slopes[fit.used].reshape(-1, len(fit.prior))
+    slopes = np.vstack((slopes, fit.noise * np.diag(np.sqrt(fit.prior))))  # what is known counts
     parts = np.argwhere(fit.free)[:, 1]
     lags, others = slopes[:, parts == LAG], slopes[:, ~np.isin(parts, _TIMES)]
     lags = lags - others @ np.linalg.lstsq(others, lags)[0] if others.size else lags
@@ -170,7 +171,7 @@ def covariance(fit: Adjustment) -> Floats:
 def drifted(fit: Adjustment) -> Adjustment:
     """The same with drifts of clocks, if any are clear and large enough to matter."""
     errors, off = fit.errors.copy(), np.zeros(len(fit.errors))
-    errors[1:, DRIFT] = np.inf
+    errors[1:, DRIFT] = 0.01 * fit.footage.span  # as rates do that are told as the same
     free = adjust(fit.given, fit.start, errors, begin=fit.change)
     off[1:] = np.sqrt(np.diag(covariance(free)))[len(off) - 1 :]
     # Standard errors by which a clock must drift, and frames over the whole video.
@@ -203,8 +204,8 @@ def learn_lags(
     rig : Rig
         As for `learn_cameras`; the readouts of shutters are told in frames of the first video.
     rates : array_like, shape (m,), optional
-        Frames of each video in one frame of the first; by default one. Small errors of these are
-        learned where the videos are long enough to tell them.
+        Frames of each video in one frame of the first; by default one. Errors of these, of about
+        1 % at most, are learned where the videos are long enough to tell them.
     start : array_like, shape (m,), optional
         Lags that are tried first, by default zero; of several that fit equally well, these win.
     clocks : sequence of array_like, shape (n_i,), optional
