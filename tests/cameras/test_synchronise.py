@@ -32,8 +32,7 @@ def test_whole_lags_move_tracks_as_they_are(motion):
     first, second, third = align(tracks, (0, 7, -12))
     np.testing.assert_array_equal(first, tracks[0])
     np.testing.assert_array_equal(second[7:97], tracks[1])
-    assert np.isnan(second[:7]).all()
-    assert np.isnan(second[97:]).all()
+    assert np.isnan(np.delete(second, slice(7, 97), axis=0)).all()
     np.testing.assert_array_equal(third, tracks[2][12:112])
 
 
@@ -72,18 +71,6 @@ def test_cubic_motions_are_interpolated_exactly(lag, rate):
     instants = np.arange(20)
     covered = (instants >= lag + 1 / rate) & (instants <= lag + 58 / rate)
     assert shown[covered].all()
-
-
-def test_fractional_lags_and_different_lengths(motion):
-    lags = (0, 7.4, -12.7)
-    tracks = filmed(motion, (250, 230, 240), lags)
-    found = learn_lags(tracks, motion[1].uncalibrated(2))
-    assert found.agree
-    assert found.warnings == ()
-    pulls = (found.frames - lags)[1:] / found.errors[1:]
-    assert np.abs(pulls).max() < 4
-    assert found.errors.max() < 0.01
-    assert found.errors[0] == 0
 
 
 def test_whole_lags_come_out_whole_and_a_small_fraction_is_not_rounded_away(motion):
@@ -219,6 +206,17 @@ def test_the_drift_of_a_clock_is_found():
     np.testing.assert_allclose(found.frames, (0, 12.4, -3.3), atol=0.15)
 
 
+def test_a_throw_before_cameras_measured_by_hand_tells_its_lags():
+    for seed in range(4):
+        rng, lags = np.random.default_rng(seed), (0, 3.3, -2)
+        rig, line = room(rng), np.array([[-0.4, 0.3, -0.4], [0.02, -0.012, 0.1], [0, 0, -0.0027]])
+        tracks = filmed((lambda k, line=line: np.vander(k, 3, True) @ line, rig), (40,) * 3, lags)
+        tracks = [np.where(rng.random((40, 1)) < 0.1, np.nan, track) for track in tracks]
+        found = learn_lags(tracks, by_hand(rng, rig))
+        assert (np.abs(found.frames - lags) <= 4 * found.errors).all()
+        assert found.errors.max() < 0.5
+
+
 def test_lags_as_text():
     assert list_lags(np.array([0.0, 7.0, -12.504, -1e-9])) == "0, 7, -12.5, 0"
 
@@ -258,12 +256,6 @@ def test_lags_of_uneven_videos_are_found(motion):
     found = learn_lags(tracks, motion[1].uncalibrated(0), rates, clocks=clocks)
     np.testing.assert_allclose(found.frames, lags, atol=2e-3)
     assert found.warnings == ()
-    shown = align(tracks, found.frames, rates, clocks)
-    for camera, track in zip(motion[1].cameras, shown, strict=True):
-        true = camera.project(motion[0](clocks[0]))
-        both = np.isfinite(track).all(axis=1)
-        assert both.mean() > 0.9
-        assert np.abs(track - true)[both].max() < 0.05
 
 
 def test_a_long_pause_of_a_camera_is_not_interpolated(motion):
@@ -271,6 +263,10 @@ def test_a_long_pause_of_a_camera_is_not_interpolated(motion):
     pairs = zip(motion[1].cameras, clocks, strict=False)
     _, second = align([c.project(motion[0](k)) for c, k in pairs], (0, 0), clocks=clocks)
     assert np.flatnonzero(np.isnan(second[:, 0])).tolist() == [30, 31]
+    whole = [c.project(motion[0](np.arange(60.0))) for c in motion[1].cameras[:2]]
+    whole[1][[10, 30, 31]] = np.nan  # frames that do not show the target are as dropped ones
+    after = align([whole[0], whole[1][clocks[1].astype(int)]], (0, 0.5), clocks=clocks)
+    np.testing.assert_allclose(align(whole, (0, 0.5))[1], after[1], atol=1e-3)
 
 
 @pytest.mark.parametrize(
