@@ -328,9 +328,12 @@ def test_a_table_of_the_track_and_the_frames_that_count(tmp_path, capsys):
     data = json.loads((law / "result.json").read_text("utf-8"))
     assert abs(data["g"]["value"] - 9.81) < 2 * data["g"]["error"] < 0.9
     assert "places in m, times in s" in data["frame"]
-    # What a run leaves is read again.
-    assert main(["discover", "--tracks", str(law / "tracks.csv"), *given, "--out", str(law)]) == 0
-    again = json.loads((law / "result.json").read_text("utf-8"))
+    # What a run leaves is read again, and not written over.
+    read = ["discover", "--tracks", str(law / "tracks.csv"), *given, "--out"]
+    assert main([*read, str(law)]) == 2
+    assert "out: must be another folder than that of what is read" in capsys.readouterr().err
+    assert main([*read, str(tmp_path / "again")]) == 0
+    again = json.loads((tmp_path / "again" / "result.json").read_text("utf-8"))
     assert again["g"] == pytest.approx(data["g"], rel=1e-6)
     far = vl.discover_from_video(table, (0, 3000, 0, 2750, 1), fps=30, frames=(124, 157)).g
     assert abs(far.value - 9.81) < 2 * far.error < 9.81

@@ -235,7 +235,7 @@ def test_of_tracks_alone_a_doubted_law_in_turned_axes(case, tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize("with_videos", [True, False])
-def test_a_refusal_shows_the_tracks_and_the_step(case, tmp_path, with_videos, capsys):
+def test_a_refusal_shows_the_tracks_and_the_step(case, tmp_path, with_videos):
     found, paths = case
     tracks = [*(track[:20] for track in found.tracks[:2]), np.full((20, 2), np.nan)]
     refused = Refused("paths: <b> shows nothing; likely causes: ...", "track", tracks)
@@ -250,10 +250,7 @@ def test_a_refusal_shows_the_tracks_and_the_step(case, tmp_path, with_videos, ca
     data = checked(page.parent)
     assert (data["status"], data["step"]) == ("refused", "track")
     assert data["share_of_frames_seen"][2] == 0
-    check_folder_is_free(page.parent)  # the next run may replace it, but not what it reads
-    tracks_file = str(page.parent / "tracks.csv")
-    assert main(["discover", "--tracks", tracks_file, "--out", str(page.parent)]) == 2
-    assert "out: must be another folder than that of what is read" in capsys.readouterr().err
+    check_folder_is_free(page.parent)  # the next run may replace it
     np.testing.assert_allclose(read_tracks(page.parent / "tracks.csv")[0].pixels, tracks[0])
 
 
