@@ -82,6 +82,7 @@ KINOVEA = (
         OURS.replace("\n", "\r\n"), "\ufeff" + OURS, "10.25 20.5\n11 21\nnan nan\n13 23\n",
         "0,10.25,20.5\n1,11,21\n2,,\n3,13,23\n",
         "frame;u;v\n0;10,25;20,5\n1;11;21\n2;;\n3;13,0;23,0\n",
+        "Frame, X, Y\n0, 10.25, 20.5\n1, 11, 21\n3, 13, 23\n",
         "my throw,2024\nFrame, X, Y\n,px,px\n0, 10.25, 20.5\n1, 11, 21\n3, 13, 23\n",
         *(GAP.replace("frame", name) for name in ("", "Frame Number", "Frame #", "slice n°")),
         GAP.replace("frame", "image").replace("10,", "v2/img10.png,").replace("7,", "v2/img7.png,"),

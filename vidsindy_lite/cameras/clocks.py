@@ -22,6 +22,7 @@ from ..arrays import Bools, Floats
 from ..checks import check_items, check_positive, check_times, check_tracks, check_vector, shown
 
 INSTANTS = 300  #: At which views are compared before all frames are.
+SAME_RATE = 0.01  #: Relative difference of frame rates that are the same.
 OVERLAP = 0.5  #: Share of the shorter of two videos that both must show.
 _FARTHEST = 1e9  # frames by which a video may start later; and ...
 _FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
@@ -247,6 +248,11 @@ class Footage:
         """Frames from the first instant to the last."""
         return max(float(np.ptp(self.instants)), 1.0)
 
+    @property
+    def drift_error(self) -> float:
+        """Frames by which a clock whose rate is told may be off at the last instant."""
+        return SAME_RATE * self.span
+
     @cached_property
     def middle(self) -> float:
         """Half way between them."""
@@ -395,8 +401,7 @@ class Clock:
                     f"got {rates.tolist()}"
                 )
             return cls(frames[0] / rates[0], rates / rates[0], frames)
-        # Relative difference of frame rates that are the same.
-        if told.any() and np.ptp(rates[told]) > 0.01 * rates[told].min():
+        if told.any() and np.ptp(rates[told]) > SAME_RATE * rates[told].min():
             raise ValueError(
                 "t: may be given, as --fps may, only for videos of one frame rate, got files that "
                 f"state {', '.join(f'{rate:g}' for rate in rates)}: leave it out, so that the "

@@ -171,7 +171,7 @@ def covariance(fit: Adjustment) -> Floats:
 def drifted(fit: Adjustment) -> Adjustment:
     """The same with drifts of clocks, if any are clear and large enough to matter."""
     errors, off = fit.errors.copy(), np.zeros(len(fit.errors))
-    errors[1:, DRIFT] = 0.01 * fit.footage.span  # as rates do that are told as the same
+    errors[1:, DRIFT] = fit.footage.drift_error
     free = adjust(fit.given, fit.start, errors, begin=fit.change)
     off[1:] = np.sqrt(np.diag(covariance(free)))[len(off) - 1 :]
     # Standard errors by which a clock must drift, and frames over the whole video.
